@@ -1,0 +1,289 @@
+//! What is to be rendered: a plain description in double precision, in world space, free of any GPU type.
+//!
+//! A [`Scene`] comes from a Mitsuba 3 file ([`mitsuba::load`]) or is built in Rust field by field:
+//!
+//! ```
+//! use tyndall::scene::*;
+//! use glam::DVec3;
+//! let mut scene = Scene::new(Camera::look_at(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::Y, 40.0), Film::new(64, 64));
+//! let haze = scene.add_medium(Medium::new("haze", DVec3::splat(0.5), DVec3::splat(0.9), Phase::HenyeyGreenstein { g: 0.6 }));
+//! scene.shapes.push(Shape::boundary("ball", Geometry::Sphere { center: DVec3::ZERO, radius: 1.0, flipped: false }, haze));
+//! scene.lights.push(Light::Constant { radiance: DVec3::ONE });
+//! ```
+//!
+//! Units: lengths in scene units, `sigma_*` in 1/scene unit, radiance in W/(m² sr) for each of the three linear sRGB
+//! channels, intensity in W/sr. Angles are in degrees where a scene file has them in degrees.
+
+use glam::{DMat4, DVec2, DVec3};
+
+pub mod mesh;
+pub mod mitsuba;
+
+/// Index of a medium in [`Scene::media`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MediumId(pub u32);
+
+/// Everything that is needed to render one picture.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Where the picture is taken from.
+    pub camera: Camera,
+    /// Size of the picture, and the part of it to render.
+    pub film: Film,
+    /// How long paths may get.
+    pub integrator: Integrator,
+    /// Surfaces: walls, lamps, and boundaries of media.
+    pub shapes: Vec<Shape>,
+    /// Media, named by shapes and by the camera through their [`MediumId`].
+    pub media: Vec<Medium>,
+    /// Light sources that are not shapes.
+    pub lights: Vec<Light>,
+    /// Samples a pixel that the scene asks for; the command line may ask for others.
+    pub sample_count: u32,
+}
+
+impl Scene {
+    /// A scene with a camera and a film and nothing else.
+    pub fn new(camera: Camera, film: Film) -> Self {
+        Scene {
+            camera,
+            film,
+            integrator: Integrator::default(),
+            shapes: Vec::new(),
+            media: Vec::new(),
+            lights: Vec::new(),
+            sample_count: 16,
+        }
+    }
+
+    /// Adds a medium and returns the name by which shapes refer to it.
+    pub fn add_medium(&mut self, medium: Medium) -> MediumId {
+        self.media.push(medium);
+        MediumId(self.media.len() as u32 - 1)
+    }
+}
+
+/// A pinhole camera with Mitsuba's conventions: camera space looks along +z, with +y up and +x to the *left*.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    /// Camera space to world space, a rigid motion (a uniform scale is tolerated; it does not change the picture).
+    pub to_world: DMat4,
+    /// Horizontal field of view of the *whole* film, in degrees, in (0, 180).
+    pub fov_x: f64,
+    /// Nothing nearer than this plane is seen; rays (and so media) begin there. Scene units.
+    pub near_clip: f64,
+    /// Surfaces beyond this plane are not seen by camera rays. Scene units.
+    pub far_clip: f64,
+    /// Shift of the principal point, as a fraction of the film's size.
+    pub principal_point_offset: DVec2,
+    /// The scene-wide medium: what fills the space that no boundary encloses. `None` is vacuum.
+    pub medium: Option<MediumId>,
+}
+
+impl Camera {
+    /// A camera at `origin` that looks at `target`, with a horizontal field of view of `fov_x` degrees, in vacuum.
+    pub fn look_at(origin: DVec3, target: DVec3, up: DVec3, fov_x: f64) -> Self {
+        Camera {
+            to_world: look_at(origin, target, up),
+            fov_x,
+            near_clip: 1e-2,
+            far_clip: 1e4,
+            principal_point_offset: DVec2::ZERO,
+            medium: None,
+        }
+    }
+}
+
+/// The transform that Mitsuba's `<lookat>` stands for: +z to the target, +x to the left, +y up.
+pub fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> DMat4 {
+    let forward = (target - origin).normalize();
+    let left = up.cross(forward).normalize();
+    let true_up = forward.cross(left);
+    DMat4::from_cols(left.extend(0.0), true_up.extend(0.0), forward.extend(0.0), origin.extend(1.0))
+}
+
+/// The film: `width × height` pixels, of which the crop window is rendered. The filter is a box of one pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Film {
+    /// Pixels in a row of the whole film.
+    pub width: u32,
+    /// Rows of the whole film.
+    pub height: u32,
+    /// The part that is rendered and written.
+    pub crop: Crop,
+}
+
+impl Film {
+    /// A film that is rendered whole.
+    pub fn new(width: u32, height: u32) -> Self {
+        Film { width, height, crop: Crop { x: 0, y: 0, width, height } }
+    }
+}
+
+/// A window of the film in pixels, from the top left corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crop {
+    /// First column.
+    pub x: u32,
+    /// First row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// How long paths may get. Depth counts as in Mitsuba 3: 1 is light seen directly, 2 has one bounce or scattering
+/// event, and so on. Crossing a boundary without a surface does not count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Integrator {
+    /// Longest path; `None` is no limit.
+    pub max_depth: Option<u32>,
+    /// Depth from which Russian roulette may end a path.
+    pub rr_depth: u32,
+    /// Emitters are not seen by the camera directly.
+    pub hide_emitters: bool,
+}
+
+impl Default for Integrator {
+    fn default() -> Self {
+        Integrator { max_depth: None, rr_depth: 3, hide_emitters: false }
+    }
+}
+
+/// One surface: a wall, a lamp, or the boundary of a medium, or several of these at once.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// For messages: the id in the scene file, or the file of the mesh.
+    pub name: String,
+    /// Points of the surface, in world space.
+    pub geometry: Geometry,
+    /// What the surface does to light.
+    pub bsdf: Bsdf,
+    /// Radiance emitted on the side of the normal; a lamp if not `None`.
+    pub emission: Option<DVec3>,
+    /// `Some` makes the surface a boundary between media.
+    pub boundary: Option<Boundary>,
+}
+
+impl Shape {
+    /// A closed, invisible surface filled with a medium.
+    pub fn boundary(name: &str, geometry: Geometry, interior: MediumId) -> Self {
+        Shape {
+            name: name.to_owned(),
+            geometry,
+            bsdf: Bsdf::Null,
+            emission: None,
+            boundary: Some(Boundary { interior: Some(interior), exterior: None }),
+        }
+    }
+
+    /// A surface that reflects diffusely on both sides.
+    pub fn diffuse(name: &str, geometry: Geometry, reflectance: DVec3) -> Self {
+        let bsdf = Bsdf::Diffuse { reflectance, two_sided: true };
+        Shape { name: name.to_owned(), geometry, bsdf, emission: None, boundary: None }
+    }
+
+    /// A black surface that emits `radiance` on the side of its normal.
+    pub fn lamp(name: &str, geometry: Geometry, radiance: DVec3) -> Self {
+        let bsdf = Bsdf::Diffuse { reflectance: DVec3::ZERO, two_sided: false };
+        Shape { name: name.to_owned(), geometry, bsdf, emission: Some(radiance), boundary: None }
+    }
+}
+
+/// The media on the two sides of a boundary. The interior is the side that the normals point away from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Boundary {
+    /// Inside; `None` is a hole of vacuum.
+    pub interior: Option<MediumId>,
+    /// Outside; `None` is whatever encloses the shape, found by geometry.
+    pub exterior: Option<MediumId>,
+}
+
+/// The points of a surface.
+#[derive(Clone, Debug)]
+pub enum Geometry {
+    /// Triangles.
+    Mesh(Mesh),
+    /// A sphere; its normals point outwards unless `flipped`.
+    Sphere {
+        /// Centre, in world space.
+        center: DVec3,
+        /// Radius, in scene units.
+        radius: f64,
+        /// Normals point inwards.
+        flipped: bool,
+    },
+}
+
+/// Triangles in world space, counter-clockwise seen from the side that the normal points to.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Corners.
+    pub positions: Vec<DVec3>,
+    /// Three indices into `positions` for each triangle.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// What a surface does to light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bsdf {
+    /// Nothing: light goes straight on.
+    Null,
+    /// Lambert's law.
+    Diffuse {
+        /// Reflected fraction of each channel, in \[0, 1\].
+        reflectance: DVec3,
+        /// Reflects on both sides; otherwise the back is black.
+        two_sided: bool,
+    },
+}
+
+/// A homogeneous participating medium.
+#[derive(Clone, Debug)]
+pub struct Medium {
+    /// For messages.
+    pub name: String,
+    /// Extinction coefficient of each channel, 1/scene unit, ≥ 0.
+    pub sigma_t: DVec3,
+    /// Single-scattering albedo `sigma_s / sigma_t` of each channel, in \[0, 1\].
+    pub albedo: DVec3,
+    /// Where scattered light goes.
+    pub phase: Phase,
+}
+
+impl Medium {
+    /// A medium from its extinction coefficient and albedo.
+    pub fn new(name: &str, sigma_t: DVec3, albedo: DVec3, phase: Phase) -> Self {
+        Medium { name: name.to_owned(), sigma_t, albedo, phase }
+    }
+}
+
+/// Phase function. The angle is the one between the directions of propagation before and after: cos = +1 is straight on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Phase {
+    /// 1/(4π) everywhere.
+    Isotropic,
+    /// Henyey and Greenstein (1941).
+    HenyeyGreenstein {
+        /// Mean cosine, in (−1, 1); positive is forward.
+        g: f64,
+    },
+}
+
+/// A light source without a surface.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// Isotropic point source.
+    Point {
+        /// World space.
+        position: DVec3,
+        /// Radiant intensity, W/sr.
+        intensity: DVec3,
+    },
+    /// The same radiance from every direction, from infinitely far.
+    Constant {
+        /// W/(m² sr).
+        radiance: DVec3,
+    },
+}
