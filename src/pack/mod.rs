@@ -1,1 +1,266 @@
-//! pack
+//! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
+
+use crate::scene::{Bsdf, Geometry, MediumId, Scene, Shape};
+use glam::{DMat3, DVec3, Vec3};
+
+pub mod bvh;
+pub mod features;
+pub mod frame;
+pub mod layout;
+pub mod lights;
+pub mod nesting;
+pub mod sobol;
+
+use bvh::Bvh;
+use features::Features;
+use frame::Frame;
+use layout::*;
+use lights::LightTable;
+use nesting::Nesting;
+
+/// A scene as tables.
+#[derive(Clone, Debug)]
+pub struct Packed {
+    /// From world space to the coordinates of all tables.
+    pub frame: Frame,
+    /// The hierarchy over `primitives`.
+    pub bvh: Bvh,
+    /// Triangles and spheres, in the order of the hierarchy's leaves.
+    pub primitives: Vec<Primitive>,
+    /// One for each shape.
+    pub surfaces: Vec<Surface>,
+    /// Media; entry 0 is vacuum, entry `k` is `MediumId(k − 1)`.
+    pub media: Vec<Medium>,
+    /// Lights that can be sampled.
+    pub lights: Vec<Light>,
+    /// The rest.
+    pub params: Params,
+    /// What the kernel must be able to do.
+    pub features: Features,
+    /// What is doubtful about the scene, for people.
+    pub warnings: Vec<String>,
+}
+
+/// A scene that has no tables.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum PackError {
+    /// More primitives than a node's link can count.
+    #[error("{0} triangles and spheres are more than the {max} that a scene can hold", max = bvh::MAX_PRIMITIVES)]
+    TooManyPrimitives(usize),
+    /// More media than a surface can name.
+    #[error("{0} media are more than the {max} that a scene can hold", max = MAX_MEDIA)]
+    TooManyMedia(usize),
+    /// A value that single precision cannot hold in the canonical frame.
+    #[error("{what} of \"{name}\" is {value:e} per canonical unit, which single precision cannot hold")]
+    OutOfRange {
+        /// Which quantity.
+        what: &'static str,
+        /// Whose.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// Media that 16 bits can name, vacuum apart.
+const MAX_MEDIA: usize = 65535;
+
+impl Packed {
+    /// Makes the tables of a render of `sample_count` samples a pixel.
+    pub fn new(scene: &Scene, seed: u32, sample_count: u32) -> Result<Packed, PackError> {
+        let frame = Frame::of(scene);
+        let nesting = Nesting::of(scene);
+        if scene.media.len() > MAX_MEDIA {
+            return Err(PackError::TooManyMedia(scene.media.len()));
+        }
+        let media = pack_media(scene, &frame)?;
+        let mut surfaces = Vec::with_capacity(scene.shapes.len());
+        let mut primitives = Vec::new();
+        let mut lights = LightTable::default();
+        for (index, shape) in scene.shapes.iter().enumerate() {
+            let surface = pack_surface(shape, nesting.exteriors[index], &media);
+            pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights);
+            surfaces.push(surface);
+        }
+        if primitives.len() > bvh::MAX_PRIMITIVES {
+            return Err(PackError::TooManyPrimitives(primitives.len()));
+        }
+        for light in &scene.lights {
+            lights.add(light, &frame);
+        }
+        let (bvh, primitives) = Bvh::new(&primitives);
+        let lights = lights.finish();
+        let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
+        let mask = sample_count.max(1).checked_next_power_of_two().map_or(u32::MAX, |power| power - 1);
+        params = Params {
+            seed,
+            grid_origin: bvh.grid_origin,
+            node_count: bvh.node_count,
+            grid_step: bvh.grid_step,
+            light_count: lights.len() as u32,
+            medium_count: media.len() as u32,
+            world_sigma_t: media[medium_index(nesting.world) as usize].sigma_t,
+            film_width: scene.film.width,
+            sample_mask: mask,
+            sample_bits: mask.count_ones(),
+            ..params
+        };
+        let warnings = nesting.warnings;
+        let features = EMPTY_FEATURES;
+        let mut packed =
+            Packed { frame, bvh, primitives, surfaces, media, lights, params, features, warnings };
+        packed.features = Features::of(scene, &packed);
+        Ok(packed)
+    }
+
+    /// Pixels of the crop window.
+    pub fn pixel_count(&self) -> usize {
+        self.params.crop_width as usize * self.params.crop_height as usize
+    }
+}
+
+/// Stands in until the tables that decide are complete.
+const EMPTY_FEATURES: Features = Features {
+    media: false,
+    chromatic: false,
+    henyey_greenstein: false,
+    boundaries: false,
+    spheres: false,
+    area_lights: false,
+    sphere_lights: false,
+    point_lights: false,
+    constant_light: false,
+    many_lights: false,
+    one_sided: false,
+    far_clip: false,
+    hide_emitters: false,
+    light_sampling: false,
+    max_depth: 0,
+    rr_depth: 0,
+    node_copies: 8,
+};
+
+/// Index in the packed table: 0 is vacuum.
+fn medium_index(medium: Option<MediumId>) -> u32 {
+    medium.map_or(0, |MediumId(index)| index + 1)
+}
+
+fn pack_media(scene: &Scene, frame: &Frame) -> Result<Vec<Medium>, PackError> {
+    let mut media = vec![Medium::default()];
+    for medium in &scene.media {
+        let sigma_t = frame.per_length(medium.sigma_t);
+        if !sigma_t.is_finite() {
+            let value = (medium.sigma_t / frame.scale).max_element();
+            return Err(PackError::OutOfRange { what: "sigma_t", name: medium.name.clone(), value });
+        }
+        let g = match medium.phase {
+            crate::scene::Phase::Isotropic => 0.0,
+            crate::scene::Phase::HenyeyGreenstein { g } => nearest_below_one(g),
+        };
+        media.push(Medium { sigma_t, g, albedo: medium.albedo.as_vec3(), unused: 0 });
+    }
+    Ok(media)
+}
+
+/// `g` in single precision, kept inside of (−1, 1) where rounding would reach the end.
+fn nearest_below_one(g: f64) -> f32 {
+    let most = 1.0 - f32::EPSILON / 2.0;
+    (g as f32).clamp(-most, most)
+}
+
+fn pack_surface(shape: &Shape, exterior: Option<MediumId>, media: &[Medium]) -> Surface {
+    let (reflectance, two_sided) = match shape.bsdf {
+        Bsdf::Null => (DVec3::ZERO, true),
+        Bsdf::Diffuse { reflectance, two_sided } => (reflectance, two_sided),
+    };
+    let (inside, outside) = match shape.boundary {
+        Some(boundary) => (medium_index(boundary.interior), medium_index(exterior)),
+        None => (0, 0),
+    };
+    Surface {
+        reflectance: reflectance.as_vec3(),
+        flags: if two_sided { SURFACE_TWO_SIDED } else { 0 },
+        sigma_t_step: media[inside as usize].sigma_t - media[outside as usize].sigma_t,
+        media: inside | outside << 16,
+    }
+}
+
+/// Appends a shape's primitives, and its lights if it emits.
+fn pack_shape(
+    shape: &Shape,
+    index: u32,
+    surface: &Surface,
+    frame: &Frame,
+    primitives: &mut Vec<Primitive>,
+    lights: &mut LightTable,
+) {
+    let crossed = shape.bsdf == Bsdf::Null;
+    if crossed && shape.boundary.is_none() && shape.emission.is_none() {
+        return; // Neither seen nor felt.
+    }
+    let flags = if crossed && shape.emission.is_none() { PRIMITIVE_BOUNDARY } else { 0 };
+    let emission = shape.emission.filter(|radiance| *radiance != DVec3::ZERO);
+    match &shape.geometry {
+        Geometry::Mesh(mesh) => {
+            let corners: Vec<[Vec3; 3]> = mesh
+                .triangles
+                .iter()
+                .map(|triangle| triangle.map(|corner| frame.point(mesh.positions[corner as usize])))
+                .collect();
+            let light_of = emission.map(|radiance| lights.add_triangles(&corners, radiance));
+            primitives.extend(corners.iter().enumerate().map(|(k, &[a, b, c])| Primitive {
+                a,
+                surface: index | flags,
+                b,
+                light: light_of.as_ref().map_or(0, |lights| lights[k] + 1),
+                c,
+                sigma_t_step: surface.sigma_t_step.x,
+            }));
+        }
+        Geometry::Sphere { center, radius, flipped } => {
+            let (a, radius) = (frame.point(*center), frame.length(*radius));
+            let side = if *flipped { -1.0 } else { 1.0 };
+            let light = emission.map_or(0, |radiance| lights.add_sphere(a, radius, side, radiance) + 1);
+            primitives.push(Primitive {
+                a,
+                surface: index | flags | PRIMITIVE_SPHERE,
+                b: Vec3::new(radius, side, 0.0),
+                light,
+                c: Vec3::ZERO,
+                sigma_t_step: surface.sigma_t_step.x,
+            });
+        }
+    }
+}
+
+/// The camera's part of the parameters.
+fn pack_camera(scene: &Scene, frame: &Frame, medium: u32) -> Params {
+    let (camera, film) = (&scene.camera, &scene.film);
+    let matrix = camera.to_world;
+    let rotation = DMat3::from_cols(
+        matrix.x_axis.truncate().normalize(),
+        matrix.y_axis.truncate().normalize(),
+        matrix.z_axis.truncate().normalize(),
+    );
+    let half_width = (camera.fov_x.to_radians() / 2.0).tan();
+    let half_height = half_width * f64::from(film.height) / f64::from(film.width);
+    let offset = camera.principal_point_offset;
+    // Camera space has +x to the left, so the film's left edge is at +x.
+    let corner = DVec3::new(half_width * (1.0 - 2.0 * offset.x), half_height * (1.0 - 2.0 * offset.y), 1.0);
+    Params {
+        camera_origin: frame.point(matrix.w_axis.truncate()),
+        camera_medium: medium,
+        camera_corner: (rotation * corner).as_vec3(),
+        near_clip: frame.length(camera.near_clip),
+        camera_right: (rotation * DVec3::new(-2.0 * half_width, 0.0, 0.0)).as_vec3(),
+        far_clip: frame.length(camera.far_clip),
+        camera_down: (rotation * DVec3::new(0.0, -2.0 * half_height, 0.0)).as_vec3(),
+        inverse_width: (1.0 / f64::from(film.width)) as f32,
+        inverse_height: (1.0 / f64::from(film.height)) as f32,
+        crop_x: film.crop.x,
+        crop_y: film.crop.y,
+        crop_width: film.crop.width,
+        crop_height: film.crop.height,
+        ..Params::default()
+    }
+}

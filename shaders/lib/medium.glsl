@@ -1,0 +1,45 @@
+// Homogeneous media: optical depths and what a path weighs after a free flight. tau is the optical depth of the flight.
+//
+// A flight is sampled with the extinction of one channel, chosen with probabilities w, and weighted with the density of the
+// mixture (one-sample MIS over the channels; Wilkie et al. 2014, Miller et al. 2019). In a gray medium this reduces to weights
+// of albedo and 1.
+#include "lib/math.glsl"
+
+// Probabilities to choose each channel: proportional to the throughput.
+vec3 channel_weights(vec3 throughput) {
+    return throughput / sum_components(throughput);
+}
+
+// The channel in which u in [0, 1) falls.
+uint sample_channel(vec3 weights, float u) {
+    return (u < weights.x ? 0u : (u < weights.x + weights.y ? 1u : 2u));
+}
+
+// Distance at which the optical depth reaches tau; never, in vacuum.
+float free_flight(float tau, float sigma_t) {
+    return sigma_t > 0.0 ? min(tau / sigma_t, INFINITE_DISTANCE) : INFINITE_DISTANCE;
+}
+
+// Probability that a flight gets as far as tau.
+float survival_probability(vec3 weights, vec3 tau) {
+    return dot(weights, exp_minus(tau));
+}
+
+// Weight of a path that got as far as tau.
+vec3 survival_weight(vec3 weights, vec3 tau) {
+    vec3 transmittance = exp_minus(tau);
+    return transmittance / dot(weights, transmittance);
+}
+
+// Weight of a path that scatters at tau.
+vec3 scatter_weight(vec3 weights, vec3 tau, vec3 sigma_t, vec3 albedo) {
+    vec3 collision = sigma_t * exp_minus(tau);
+    return albedo * collision / dot(weights, collision);
+}
+
+// The medium behind a boundary that is crossed from `from` to `to`. Boundaries that coincide may be met in either order;
+// the indices add up to the right one once all are crossed. A medium that the boundary does not expect in front of it, but
+// behind it, stays: the vertex lay on the other side by rounding.
+uint cross_boundary(uint medium, uint from, uint to) {
+    return medium == from || medium == to ? to : medium + to - from;
+}

@@ -1,0 +1,190 @@
+//! Renders blocks of samples on a Vulkan device.
+
+use super::buffer::Buffer;
+use super::kernel::Kernel;
+use super::shader::{Variant, compile_cached, expand};
+use super::{Device, Error};
+use crate::pack::Packed;
+use crate::pack::layout::{Dispatch, TILE};
+use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Most samples in flight: their radiances take 16 bytes each.
+const MAX_SAMPLES: usize = 1 << 22;
+/// Bindings of the path tracer; the first [`ADDRESSES`] can also be read by address.
+const BINDINGS: u32 = 7;
+const ADDRESSES: usize = 6;
+const TILE_PIXELS: usize = (TILE * TILE) as usize;
+
+/// A scene on a device.
+pub struct Renderer {
+    device: Arc<Device>,
+    path_trace: Kernel,
+    resolve: Kernel,
+    /// Nodes, primitives, surfaces, media, lights: the tables that kernels only read.
+    tables: [Buffer; 5],
+    params: Buffer,
+    samples: Buffer,
+    sums: Buffer,
+    invalid: Buffer,
+    crop: [u32; 2],
+    /// Samples that `samples` holds.
+    capacity: usize,
+}
+
+impl Renderer {
+    /// Uploads the tables and compiles the kernels for just this scene.
+    pub fn new(device: &Arc<Device>, packed: &Packed) -> Result<Renderer, Error> {
+        let variant = Variant {
+            features: packed.features,
+            workgroup: device.subgroup_size,
+            buffer_reference: device.buffer_reference,
+        };
+        Renderer::with_variant(device, packed, &variant)
+    }
+
+    /// The same with a kernel that can do more than the scene needs, or in another form.
+    pub fn with_variant(device: &Arc<Device>, packed: &Packed, variant: &Variant) -> Result<Renderer, Error> {
+        let push_size = ADDRESSES * 8 + size_of::<Dispatch>();
+        let code = compile_cached(&expand("path_trace.comp", variant)?)?;
+        let path_trace = Kernel::new(device, &code, BINDINGS, push_size as u32)?;
+        let code = compile_cached(&expand("resolve.comp", variant)?)?;
+        let resolve = Kernel::new(device, &code, 4, size_of::<Dispatch>() as u32)?;
+        let tables = [
+            Buffer::new(device, "nodes", &packed.bvh.nodes)?,
+            Buffer::new(device, "primitives", &packed.primitives)?,
+            Buffer::new(device, "surfaces", &packed.surfaces)?,
+            Buffer::new(device, "media", &packed.media)?,
+            Buffer::new(device, "lights", &packed.lights)?,
+        ];
+        let crop = [packed.params.crop_width, packed.params.crop_height];
+        let pixels = tile_count(crop) as usize * TILE_PIXELS;
+        let most = MAX_SAMPLES.max(BLOCK_SAMPLES as usize * TILE_PIXELS);
+        let capacity = (pixels * 256).min(most);
+        Ok(Renderer {
+            device: device.clone(),
+            path_trace,
+            resolve,
+            tables,
+            params: Buffer::new(device, "params", &[packed.params])?,
+            samples: Buffer::zeroed::<[f32; 4]>(device, "samples", capacity)?,
+            sums: Buffer::zeroed::<[f32; 4]>(device, "sums", 2 * capacity.div_ceil(BLOCK_SAMPLES as usize) + pixels.min(capacity) * 2)?,
+            invalid: Buffer::zeroed::<[u32; 4]>(device, "invalid", capacity / TILE_PIXELS)?,
+            crop,
+            capacity,
+        })
+    }
+
+    /// Renders some samples of some tiles, and adds them to the blocks that they belong to.
+    fn dispatch(&mut self, samples: Range<u32>, tiles: Range<u32>, blocks: &mut [Block]) -> Result<(), Error> {
+        let tile_count = tiles.end - tiles.start;
+        let work = Dispatch {
+            first_sample: samples.start,
+            sample_count: samples.end - samples.start,
+            first_tile: tiles.start,
+            tile_count,
+            tile_step: coprime_step(tile_count),
+            ..Dispatch::default()
+        };
+        let [nodes, primitives, surfaces, media, lights] = &self.tables;
+        let buffers = [nodes, primitives, surfaces, media, lights, &self.samples, &self.params];
+        let addresses: Vec<u64> = if self.device.buffer_reference {
+            buffers[..ADDRESSES].iter().map(|buffer| buffer.address()).collect()
+        } else {
+            vec![0; ADDRESSES]
+        };
+        let push = [bytemuck::cast_slice(&addresses), bytemuck::bytes_of(&work)].concat();
+        self.path_trace.dispatch(&buffers, &push, tile_count)?;
+
+        self.invalid.write(&vec![[0u32; 4]; blocks.len()]);
+        let pixels = tile_count as usize * TILE_PIXELS;
+        let groups = (pixels as u32).div_ceil(self.device.subgroup_size);
+        let buffers = [&self.samples, &self.sums, &self.invalid, &self.params];
+        self.resolve.dispatch(&buffers, bytemuck::bytes_of(&work), groups)?;
+        self.collect(tiles.start, pixels, blocks);
+        Ok(())
+    }
+
+    /// Takes the sums of a dispatch from tiles to rows of the crop window.
+    fn collect(&self, first_tile: u32, pixels: usize, blocks: &mut [Block]) {
+        let sums: Vec<[[f32; 4]; 2]> = self.sums.read(pixels * blocks.len());
+        let invalid: Vec<[u32; 4]> = self.invalid.read(blocks.len());
+        let [width, height] = self.crop.map(|side| side as usize);
+        let tiles_across = width.div_ceil(TILE as usize);
+        for ((block, sums), invalid) in blocks.iter_mut().zip(sums.chunks_exact(pixels)).zip(&invalid) {
+            for (slot, [sum, squares]) in sums.iter().enumerate() {
+                let (tile, pixel) = (first_tile as usize + slot / TILE_PIXELS, slot % TILE_PIXELS);
+                let x = tile % tiles_across * TILE as usize + pixel % TILE as usize;
+                let y = tile / tiles_across * TILE as usize + pixel / TILE as usize;
+                if x < width && y < height {
+                    block.sums[y * width + x] = [sum[0], sum[1], sum[2]];
+                    block.squares[y * width + x] = [squares[0], squares[1], squares[2]];
+                }
+            }
+            for (total, count) in block.invalid.iter_mut().zip(invalid) {
+                *total += u64::from(*count);
+            }
+        }
+    }
+}
+
+impl Backend for Renderer {
+    fn device(&self) -> &DeviceInfo {
+        &self.device.info
+    }
+
+    fn render(&mut self, samples: Range<u32>) -> Result<Vec<Block>, BackendError> {
+        let device = self.device.info.name.clone();
+        render_all(self, samples).map_err(|error| BackendError { device, cause: error.to_string() })
+    }
+}
+
+fn render_all(renderer: &mut Renderer, samples: Range<u32>) -> Result<Vec<Block>, Error> {
+    assert!(samples.start.is_multiple_of(BLOCK_SAMPLES), "blocks are aligned");
+    let tile_count = tile_count(renderer.crop);
+    let pixel_count = renderer.crop[0] as usize * renderer.crop[1] as usize;
+    let mut blocks = Vec::new();
+    let mut first = samples.start;
+    while first < samples.end {
+        // As many samples of a pixel as there is room for, then as many tiles.
+        let room = (renderer.capacity / (tile_count as usize * TILE_PIXELS)) as u32 / BLOCK_SAMPLES * BLOCK_SAMPLES;
+        let last = samples.end.min(first.saturating_add(room.max(BLOCK_SAMPLES)));
+        let tiles_at_once = (renderer.capacity / ((last - first) as usize * TILE_PIXELS)) as u32;
+        let mut part: Vec<Block> = (first..last)
+            .step_by(BLOCK_SAMPLES as usize)
+            .map(|start| Block {
+                first: start,
+                count: (last - start).min(BLOCK_SAMPLES),
+                sums: vec![[0.0; 3]; pixel_count],
+                squares: vec![[0.0; 3]; pixel_count],
+                invalid: [0; 3],
+            })
+            .collect();
+        let mut tile = 0;
+        while tile < tile_count {
+            let end = tile_count.min(tile + tiles_at_once);
+            renderer.dispatch(first..last, tile..end, &mut part)?;
+            tile = end;
+        }
+        blocks.append(&mut part);
+        first = last;
+    }
+    Ok(blocks)
+}
+
+fn tile_count(crop: [u32; 2]) -> u32 {
+    crop[0].div_ceil(TILE) * crop[1].div_ceil(TILE)
+}
+
+/// A number near the golden section of `count` that has no factor in common with it.
+fn coprime_step(count: u32) -> u32 {
+    let gcd = |mut a: u32, mut b: u32| {
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    let start = (f64::from(count) * 0.618) as u32;
+    (start.max(1)..).find(|&step| gcd(step, count) == 1).unwrap_or(1)
+}

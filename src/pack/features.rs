@@ -1,0 +1,124 @@
+//! What a scene needs of the kernel. The kernel is compiled for just that.
+
+use super::Packed;
+use super::layout::*;
+use crate::scene::{Integrator, Scene};
+
+/// Constants of the kernel, decided once for a scene. Each becomes a `const` of `features.glsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Features {
+    /// Any medium that a ray can be in.
+    pub media: bool,
+    /// A medium whose extinction differs between the channels.
+    pub chromatic: bool,
+    /// A phase function with g ≠ 0.
+    pub henyey_greenstein: bool,
+    /// A surface that rays cross without an event.
+    pub boundaries: bool,
+    /// Spheres among the primitives.
+    pub spheres: bool,
+    /// A triangle, parallelogram or sphere that emits.
+    pub area_lights: bool,
+    /// A sphere that emits.
+    pub sphere_lights: bool,
+    /// A point that emits.
+    pub point_lights: bool,
+    /// Radiance from infinitely far.
+    pub constant_light: bool,
+    /// More than one light to choose from.
+    pub many_lights: bool,
+    /// A surface whose back is black.
+    pub one_sided: bool,
+    /// Surfaces that only the far clip plane hides.
+    pub far_clip: bool,
+    /// Emitters are not seen by the camera directly.
+    pub hide_emitters: bool,
+    /// Light is sampled at the vertices of paths.
+    pub light_sampling: bool,
+    /// Longest path; `u32::MAX` is no limit.
+    pub max_depth: u32,
+    /// Depth from which Russian roulette may end a path.
+    pub rr_depth: u32,
+    /// Copies of the tree: 8 or 1.
+    pub node_copies: u32,
+}
+
+impl Features {
+    /// What the scene and its tables need.
+    pub fn of(scene: &Scene, packed: &Packed) -> Features {
+        let Integrator { max_depth, rr_depth, hide_emitters } = scene.integrator;
+        let media = packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
+        let kind = |kind: u32| packed.lights.iter().any(|light| light.kind == kind);
+        let area_lights = kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD) || kind(LIGHT_SPHERE);
+        let max_depth = max_depth.unwrap_or(u32::MAX);
+        Features {
+            media,
+            chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x)),
+            henyey_greenstein: packed.media.iter().any(|medium| medium.g != 0.0),
+            boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
+            spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
+            area_lights,
+            sphere_lights: kind(LIGHT_SPHERE),
+            point_lights: kind(LIGHT_POINT),
+            constant_light: kind(LIGHT_CONSTANT),
+            many_lights: packed.lights.len() > 1,
+            one_sided: packed.surfaces.iter().any(|surface| surface.flags & SURFACE_TWO_SIDED == 0),
+            far_clip: {
+                let eye = packed.params.camera_origin;
+                packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
+            },
+            hide_emitters,
+            // Where the only light is the surroundings and nothing absorbs on the way, scattered rays find it just as well.
+            light_sampling: max_depth > 1 && (area_lights || kind(LIGHT_POINT) || (kind(LIGHT_CONSTANT) && media)),
+            max_depth,
+            rr_depth,
+            node_copies: packed.bvh.copies,
+        }
+    }
+
+    /// The same kernel with everything compiled in: it must render the same image.
+    pub fn everything(self) -> Features {
+        Features {
+            media: true,
+            chromatic: true,
+            henyey_greenstein: true,
+            boundaries: true,
+            spheres: true,
+            area_lights: true,
+            sphere_lights: true,
+            point_lights: true,
+            constant_light: true,
+            many_lights: true,
+            one_sided: true,
+            far_clip: true,
+            ..self
+        }
+    }
+
+    /// The text of `features.glsl`.
+    pub fn glsl(&self) -> String {
+        let switches = [
+            ("HAS_MEDIA", self.media),
+            ("HAS_CHROMATIC", self.chromatic),
+            ("HAS_HENYEY_GREENSTEIN", self.henyey_greenstein),
+            ("HAS_BOUNDARIES", self.boundaries),
+            ("HAS_SPHERES", self.spheres),
+            ("HAS_AREA_LIGHTS", self.area_lights),
+            ("HAS_SPHERE_LIGHTS", self.sphere_lights),
+            ("HAS_POINT_LIGHTS", self.point_lights),
+            ("HAS_CONSTANT_LIGHT", self.constant_light),
+            ("HAS_MANY_LIGHTS", self.many_lights),
+            ("HAS_ONE_SIDED", self.one_sided),
+            ("HAS_FAR_CLIP", self.far_clip),
+            ("HAS_HIDDEN_EMITTERS", self.hide_emitters),
+            ("HAS_LIGHT_SAMPLING", self.light_sampling),
+        ]
+        .map(|(name, value)| format!("const bool {name} = {value};\n"))
+        .concat();
+        let numbers =
+            [("MAX_DEPTH", self.max_depth), ("RR_DEPTH", self.rr_depth), ("NODE_COPIES", self.node_copies)]
+                .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
+                .concat();
+        switches + &numbers
+    }
+}

@@ -1,0 +1,284 @@
+//! The one declaration of every struct that Rust and GLSL share.
+//!
+//! [`gpu_struct!`] declares a `#[repr(C)]` struct, its GLSL text with the same doc comments, the offsets of its members, and
+//! asserts at compile time that these are the offsets of std430. A test compares all of it with what naga reads back
+//! from each compiled kernel.
+//!
+//! A `Vec3` is followed by a scalar that fills its sixteen bytes; a struct's size is a multiple of sixteen.
+
+use glam::{Vec2, Vec3};
+
+/// A type that has a name in GLSL.
+pub trait GlslType {
+    /// The name.
+    const NAME: &'static str;
+    /// Alignment under std430, in bytes.
+    const ALIGN: usize;
+}
+
+macro_rules! glsl_types {
+    ($($rust:ty => $name:literal, $align:literal;)*) => {
+        $(impl GlslType for $rust { const NAME: &'static str = $name; const ALIGN: usize = $align; })*
+    };
+}
+
+glsl_types! {
+    f32 => "float", 4;
+    u32 => "uint", 4;
+    i32 => "int", 4;
+    Vec2 => "vec2", 8;
+    Vec3 => "vec3", 16;
+}
+
+/// One member of a shared struct.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Its name, the same in both languages.
+    pub name: &'static str,
+    /// Its type in GLSL.
+    pub glsl: &'static str,
+    /// Bytes from the start of the struct.
+    pub offset: usize,
+    /// What it is, from the doc comment.
+    pub doc: &'static str,
+}
+
+/// A struct that Rust and GLSL share.
+pub trait GpuStruct: bytemuck::Pod {
+    /// Its name, the same in both languages.
+    const NAME: &'static str;
+    /// Its members, in order.
+    const FIELDS: &'static [Field];
+
+    /// Its declaration in GLSL.
+    fn glsl() -> String {
+        let mut text = format!("struct {} {{\n", Self::NAME);
+        for field in Self::FIELDS {
+            text += &format!("    {} {}; //{}\n", field.glsl, field.name, field.doc);
+        }
+        text + "};\n"
+    }
+}
+
+/// Declares a struct for Rust and GLSL at once. See the module's documentation.
+#[macro_export]
+macro_rules! gpu_struct {
+    ($(#[$meta:meta])* pub struct $name:ident { $( $(#[doc = $doc:literal])+ $field:ident : $ty:ty ),* $(,)? }) => {
+        $(#[$meta])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+        pub struct $name { $( $(#[doc = $doc])+ pub $field: $ty ),* }
+
+        impl $crate::pack::layout::GpuStruct for $name {
+            const NAME: &'static str = stringify!($name);
+            const FIELDS: &'static [$crate::pack::layout::Field] = &[ $( $crate::pack::layout::Field {
+                name: stringify!($field),
+                glsl: <$ty as $crate::pack::layout::GlslType>::NAME,
+                offset: std::mem::offset_of!($name, $field),
+                doc: concat!($($doc),+),
+            } ),* ];
+        }
+
+        const _: () = {
+            $( assert!(
+                std::mem::offset_of!($name, $field) % <$ty as $crate::pack::layout::GlslType>::ALIGN == 0,
+                concat!(stringify!($name), ".", stringify!($field), " is not aligned as std430 asks")
+            ); )*
+            assert!(size_of::<$name>() % 16 == 0, concat!(stringify!($name), ": its size is not a multiple of 16"));
+        };
+    };
+}
+
+gpu_struct! {
+    /// A primitive of the BVH's leaves: a triangle, or a sphere.
+    pub struct Primitive {
+        /// First corner; the centre of a sphere.
+        a: Vec3,
+        /// Index of its surface; bit 31: crossing it is no event but a change of medium; bit 30: a sphere.
+        surface: u32,
+        /// Second corner; (radius, +1 or −1 for normals out or in, 0) of a sphere.
+        b: Vec3,
+        /// Index of its light plus one; 0 if it does not emit.
+        light: u32,
+        /// Third corner, counter-clockwise seen from where the normal points to.
+        c: Vec3,
+        /// Of a boundary: sigma_t inside minus sigma_t outside, red channel. The other channels are in the surface.
+        sigma_t_step: f32,
+    }
+}
+
+gpu_struct! {
+    /// What the primitives of one shape have in common.
+    pub struct Surface {
+        /// Reflected fraction of each channel.
+        reflectance: Vec3,
+        /// Bit 0: reflects on both sides.
+        flags: u32,
+        /// Of a boundary: sigma_t inside minus sigma_t outside.
+        sigma_t_step: Vec3,
+        /// Of a boundary: the medium inside (low 16 bits) and outside (high 16 bits); 0 is vacuum.
+        media: u32,
+    }
+}
+
+gpu_struct! {
+    /// A homogeneous medium. Entry 0 of the table is vacuum.
+    pub struct Medium {
+        /// Extinction coefficient, 1/canonical unit.
+        sigma_t: Vec3,
+        /// Mean cosine of Henyey and Greenstein's phase function.
+        g: f32,
+        /// Single-scattering albedo.
+        albedo: Vec3,
+        /// Fills the sixteen bytes.
+        unused: u32,
+    }
+}
+
+gpu_struct! {
+    /// A light, with its line of the alias table by which lights are chosen.
+    pub struct Light {
+        /// A corner; the position of a point; the centre of a sphere.
+        origin: Vec3,
+        /// One of the `LIGHT_` constants.
+        kind: u32,
+        /// First edge, from the corner; (radius, 0, 0) of a sphere.
+        edge_1: Vec3,
+        /// Probability to choose this light.
+        probability: f32,
+        /// Second edge, from the corner.
+        edge_2: Vec3,
+        /// Area, canonical units²; 0 where it has no meaning.
+        area: f32,
+        /// Emitted radiance; the intensity of a point.
+        radiance: Vec3,
+        /// Alias table: the light of this line is taken if the rescaled number is below.
+        alias_threshold: f32,
+        /// Unit normal of the emitting side.
+        normal: Vec3,
+        /// Alias table: the light that is taken otherwise.
+        alias: u32,
+    }
+}
+
+gpu_struct! {
+    /// What holds for a whole render.
+    pub struct Params {
+        /// The camera's centre.
+        camera_origin: Vec3,
+        /// Index of the medium at the camera.
+        camera_medium: u32,
+        /// Direction through the film's top left corner; its component along the optical axis has length 1.
+        camera_corner: Vec3,
+        /// Rays begin at this plane.
+        near_clip: f32,
+        /// Step of the direction from the left edge of the film to the right.
+        camera_right: Vec3,
+        /// Rays end at this plane.
+        far_clip: f32,
+        /// Step of the direction from the top edge of the film to the bottom.
+        camera_down: Vec3,
+        /// Seed of every random number.
+        seed: u32,
+        /// Lower corner of the nodes' grid.
+        grid_origin: Vec3,
+        /// Nodes in one copy of the tree.
+        node_count: u32,
+        /// Grid step of the nodes' bounds.
+        grid_step: Vec3,
+        /// Lights in the table.
+        light_count: u32,
+        /// 1 / width of the whole film.
+        inverse_width: f32,
+        /// 1 / height of the whole film.
+        inverse_height: f32,
+        /// First column of the crop window.
+        crop_x: u32,
+        /// First row of the crop window.
+        crop_y: u32,
+        /// Columns of the crop window.
+        crop_width: u32,
+        /// Rows of the crop window.
+        crop_height: u32,
+        /// Samples of the whole render, rounded up to a power of two, minus 1: the mask of Sobol indices.
+        sample_mask: u32,
+        /// Bits set in the mask.
+        sample_bits: u32,
+        /// Extinction coefficient outside of all boundaries.
+        world_sigma_t: Vec3,
+        /// Entries in the table of media.
+        medium_count: u32,
+        /// Columns of the whole film.
+        film_width: u32,
+        /// Fills the sixteen bytes.
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
+        /// Fills the sixteen bytes.
+        unused_3: u32,
+    }
+}
+
+gpu_struct! {
+    /// What holds for one dispatch. It travels as push constants, behind the addresses of the buffers.
+    pub struct Dispatch {
+        /// First sample of each pixel.
+        first_sample: u32,
+        /// Samples of each pixel.
+        sample_count: u32,
+        /// First tile of the crop window.
+        first_tile: u32,
+        /// Tiles.
+        tile_count: u32,
+        /// A step coprime to the number of tiles: workgroup `k` renders tile `k tile_step mod tile_count`.
+        tile_step: u32,
+        /// Fills the sixteen bytes.
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
+        /// Fills the sixteen bytes.
+        unused_3: u32,
+    }
+}
+
+/// Bit 31 of [`Primitive::surface`].
+pub const PRIMITIVE_BOUNDARY: u32 = 1 << 31;
+/// Bit 30 of [`Primitive::surface`].
+pub const PRIMITIVE_SPHERE: u32 = 1 << 30;
+/// Bit 0 of [`Surface::flags`].
+pub const SURFACE_TWO_SIDED: u32 = 1;
+/// [`Light::kind`]: a triangle.
+pub const LIGHT_TRIANGLE: u32 = 0;
+/// [`Light::kind`]: a parallelogram.
+pub const LIGHT_QUAD: u32 = 1;
+/// [`Light::kind`]: the outside of a sphere.
+pub const LIGHT_SPHERE: u32 = 2;
+/// [`Light::kind`]: a point.
+pub const LIGHT_POINT: u32 = 3;
+/// [`Light::kind`]: the same radiance from every direction.
+pub const LIGHT_CONSTANT: u32 = 4;
+/// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
+pub const TILE: u32 = 8;
+/// Longest distance; rays that end nowhere end here.
+pub const INFINITE_DISTANCE: f32 = 1e30;
+
+/// The text of `layout.glsl`: all shared structs and constants.
+pub fn glsl() -> String {
+    let structs =
+        [Primitive::glsl(), Surface::glsl(), Medium::glsl(), Light::glsl(), Params::glsl(), Dispatch::glsl()].concat();
+    let constants = [
+        ("PRIMITIVE_BOUNDARY", PRIMITIVE_BOUNDARY),
+        ("PRIMITIVE_SPHERE", PRIMITIVE_SPHERE),
+        ("SURFACE_TWO_SIDED", SURFACE_TWO_SIDED),
+        ("LIGHT_TRIANGLE", LIGHT_TRIANGLE),
+        ("LIGHT_QUAD", LIGHT_QUAD),
+        ("LIGHT_SPHERE", LIGHT_SPHERE),
+        ("LIGHT_POINT", LIGHT_POINT),
+        ("LIGHT_CONSTANT", LIGHT_CONSTANT),
+        ("TILE", TILE),
+        ("BLOCK_SAMPLES", crate::render::BLOCK_SAMPLES),
+    ]
+    .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
+    .concat();
+    format!("{structs}\n{constants}const float INFINITE_DISTANCE = {INFINITE_DISTANCE:e};\n")
+}

@@ -1,0 +1,147 @@
+//! The table of lights and the alias table by which one is chosen in constant time (Walker 1977, Vose 1991).
+
+use super::frame::Frame;
+use super::layout::{LIGHT_CONSTANT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_TRIANGLE, Light};
+use crate::scene;
+use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
+
+/// Share of the choice that is uniform over the lights. The rest goes by power, which says little about what arrives.
+const UNIFORM_SHARE: f64 = 0.1;
+
+/// Collects lights with their power, then builds the table.
+#[derive(Default)]
+pub struct LightTable {
+    lights: Vec<Light>,
+    powers: Vec<f64>,
+}
+
+impl LightTable {
+    /// Adds the triangles of a lamp and returns the index of the light of each. Two neighbours that make up a parallelogram
+    /// are one light.
+    pub fn add_triangles(&mut self, triangles: &[[Vec3; 3]], radiance: DVec3) -> Vec<u32> {
+        let mut indices = Vec::with_capacity(triangles.len());
+        while indices.len() < triangles.len() {
+            let first = triangles[indices.len()];
+            let quad = triangles.get(indices.len() + 1).and_then(|second| parallelogram(first, *second));
+            let [corner, one, two] = quad.unwrap_or(first);
+            let cross = (one - corner).cross(two - corner);
+            let area = cross.length() * if quad.is_some() { 1.0 } else { 0.5 };
+            let light = Light {
+                origin: corner,
+                kind: if quad.is_some() { LIGHT_QUAD } else { LIGHT_TRIANGLE },
+                edge_1: one - corner,
+                edge_2: two - corner,
+                area,
+                radiance: radiance.as_vec3(),
+                normal: cross.normalize_or_zero(),
+                ..Light::default()
+            };
+            let index = self.push(light, mean(radiance) * f64::from(area) * PI);
+            indices.push(index);
+            if quad.is_some() {
+                indices.push(index);
+            }
+        }
+        indices
+    }
+
+    /// Adds a sphere that emits outwards (`side` 1) or inwards (−1) and returns its index.
+    pub fn add_sphere(&mut self, center: Vec3, radius: f32, side: f32, radiance: DVec3) -> u32 {
+        let area = 4.0 * PI * f64::from(radius).powi(2);
+        let light = Light {
+            origin: center,
+            kind: LIGHT_SPHERE,
+            edge_1: Vec3::new(radius, side, 0.0),
+            area: area as f32,
+            radiance: radiance.as_vec3(),
+            ..Light::default()
+        };
+        self.push(light, mean(radiance) * area * PI)
+    }
+
+    /// Adds a light without a surface.
+    pub fn add(&mut self, light: &scene::Light, frame: &Frame) {
+        match light {
+            scene::Light::Point { position, intensity } => {
+                // Intensity over distance² is irradiance: it scales as an area.
+                let scaled = *intensity * frame.scale.powi(2);
+                let light = Light {
+                    origin: frame.point(*position),
+                    kind: LIGHT_POINT,
+                    radiance: scaled.as_vec3(),
+                    ..Light::default()
+                };
+                self.push(light, mean(scaled) * 4.0 * PI);
+            }
+            scene::Light::Constant { radiance } => {
+                let light = Light { kind: LIGHT_CONSTANT, radiance: radiance.as_vec3(), ..Light::default() };
+                // Through the disc of a sphere about the scene, from all directions.
+                self.push(light, mean(*radiance) * 4.0 * PI * PI * frame.radius.max(0.5).powi(2));
+            }
+        }
+    }
+
+    fn push(&mut self, light: Light, power: f64) -> u32 {
+        self.lights.push(light);
+        self.powers.push(power);
+        self.lights.len() as u32 - 1
+    }
+
+    /// The lights, with the probabilities and the alias table filled in.
+    pub fn finish(mut self) -> Vec<Light> {
+        let count = self.lights.len();
+        let total: f64 = self.powers.iter().sum();
+        let probability = |power: f64| {
+            let by_power = if total > 0.0 { power / total } else { 1.0 / count as f64 };
+            (1.0 - UNIFORM_SHARE) * by_power + UNIFORM_SHARE / count as f64
+        };
+        let probabilities: Vec<f64> = self.powers.iter().map(|&power| probability(power)).collect();
+        for ((light, probability), (threshold, alias)) in
+            self.lights.iter_mut().zip(&probabilities).zip(alias_table(&probabilities))
+        {
+            light.probability = *probability as f32;
+            light.alias_threshold = threshold as f32;
+            light.alias = alias;
+        }
+        self.lights
+    }
+}
+
+fn mean(value: DVec3) -> f64 {
+    value.element_sum() / 3.0
+}
+
+/// Corner and its two neighbours, if the triangles are the halves of a parallelogram with the same orientation.
+fn parallelogram(first: [Vec3; 3], second: [Vec3; 3]) -> Option<[Vec3; 3]> {
+    // In each rotation of both, ask for (a, b, c) and (a, c, d), with a + c = b + d up to rounding.
+    for i in 0..3 {
+        for j in 0..3 {
+            let [a, b, c] = [first[i], first[(i + 1) % 3], first[(i + 2) % 3]];
+            let [a2, c2, d] = [second[j], second[(j + 1) % 3], second[(j + 2) % 3]];
+            let size = (b - a).abs().max((d - a).abs()).max_element();
+            if a == a2 && c == c2 && ((a + c) - (b + d)).abs().max_element() <= size * 1e-6 {
+                return Some([a, b, d]);
+            }
+        }
+    }
+    None
+}
+
+/// For each line the threshold below which the line itself is taken, and the line that is taken otherwise.
+pub fn alias_table(probabilities: &[f64]) -> Vec<(f64, u32)> {
+    let count = probabilities.len();
+    let mut scaled: Vec<f64> = probabilities.iter().map(|p| p * count as f64).collect();
+    let mut table: Vec<(f64, u32)> = (0..count as u32).map(|index| (1.0, index)).collect();
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..count).partition(|&index| scaled[index] < 1.0);
+    while let (Some(&less), Some(&more)) = (small.last(), large.last()) {
+        small.pop();
+        table[less] = (scaled[less], more as u32);
+        scaled[more] -= 1.0 - scaled[less];
+        if scaled[more] < 1.0 {
+            large.pop();
+            small.push(more);
+        }
+    }
+    table
+}

@@ -1,0 +1,161 @@
+//! Which medium is where: found by geometry, so that a scene need not say it.
+//!
+//! A boundary without an `exterior` gets the medium that encloses it, and the camera the medium that it stands in. What a
+//! closed surface encloses is decided by the generalised winding number (Jacobson, Kavan and Sorkine-Hornung 2013): the
+//! solid angle under which the surface is seen, over 4π, which needs no ray and is exact for closed meshes.
+
+use super::frame::Bounds;
+use crate::scene::{Geometry, MediumId, Mesh, Scene, Shape};
+use glam::DVec3;
+
+/// The media that geometry decides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nesting {
+    /// For each shape that is a boundary: the medium outside.
+    pub exteriors: Vec<Option<MediumId>>,
+    /// The medium outside of all boundaries.
+    pub world: Option<MediumId>,
+    /// The medium at the camera.
+    pub camera: Option<MediumId>,
+    /// What contradicts itself, for people.
+    pub warnings: Vec<String>,
+}
+
+/// Triangles of a shape that are asked for what lies outside of them.
+const PROBES: usize = 9;
+
+impl Nesting {
+    /// Finds all of it.
+    pub fn of(scene: &Scene) -> Nesting {
+        let enclosures: Vec<Enclosure> = scene.shapes.iter().enumerate().filter_map(Enclosure::of).collect();
+        let eye = scene.camera.to_world.w_axis.truncate();
+        let mut warnings = Vec::new();
+
+        let around_camera = innermost(&enclosures, eye, None);
+        // A medium named by the camera fills the space outside of all boundaries, unless the camera stands inside of one:
+        // then the name only repeats what that boundary says.
+        let world = if around_camera.is_some() { None } else { scene.camera.medium };
+        let camera = around_camera.map_or(world, |enclosure| enclosure.interior);
+        if let Some(enclosure) = around_camera
+            && scene.camera.medium.is_some()
+            && scene.camera.medium != enclosure.interior
+        {
+            warnings.push(format!(
+                "the sensor names {}, but it stands inside \"{}\", which is filled with {}; the latter is used",
+                medium_name(scene, scene.camera.medium),
+                scene.shapes[enclosure.shape].name,
+                medium_name(scene, enclosure.interior)
+            ));
+        }
+
+        let mut exteriors = vec![None; scene.shapes.len()];
+        for (index, shape) in scene.shapes.iter().enumerate() {
+            let Some(boundary) = shape.boundary else { continue };
+            if boundary.exterior.is_some() {
+                exteriors[index] = boundary.exterior;
+                continue;
+            }
+            let mut votes: Vec<(Option<MediumId>, usize)> = Vec::new();
+            for probe in probes(&shape.geometry) {
+                let medium = innermost(&enclosures, probe, Some(index)).map_or(world, |enclosure| enclosure.interior);
+                match votes.iter_mut().find(|(candidate, _)| *candidate == medium) {
+                    Some((_, count)) => *count += 1,
+                    None => votes.push((medium, 1)),
+                }
+            }
+            votes.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+            if votes.len() > 1 {
+                let names: Vec<String> = votes.iter().map(|(medium, _)| medium_name(scene, *medium)).collect();
+                warnings.push(format!(
+                    "\"{}\" lies partly in {}: boundaries that overlap have no defined medium; {} is taken as its exterior",
+                    shape.name,
+                    names.join(" and partly in "),
+                    names[0]
+                ));
+            }
+            exteriors[index] = votes.first().and_then(|(medium, _)| *medium);
+        }
+        Nesting { exteriors, world, camera, warnings }
+    }
+}
+
+fn medium_name(scene: &Scene, medium: Option<MediumId>) -> String {
+    match medium {
+        Some(MediumId(index)) => format!("the medium \"{}\"", scene.media[index as usize].name),
+        None => "vacuum".to_owned(),
+    }
+}
+
+/// A boundary seen as a region of space.
+struct Enclosure<'a> {
+    shape: usize,
+    geometry: &'a Geometry,
+    bounds: Bounds,
+    interior: Option<MediumId>,
+}
+
+impl<'a> Enclosure<'a> {
+    fn of((shape, value): (usize, &'a Shape)) -> Option<Enclosure<'a>> {
+        let boundary = value.boundary?;
+        Some(Enclosure { shape, geometry: &value.geometry, bounds: Bounds::of(&value.geometry), interior: boundary.interior })
+    }
+
+    fn contains(&self, point: DVec3) -> bool {
+        self.bounds.contains(point) && winding_number(self.geometry, point).abs() > 0.5
+    }
+}
+
+/// The smallest region that holds a point. Regions that hold the same point are nested, so the smallest is the innermost.
+fn innermost<'a, 'b>(enclosures: &'b [Enclosure<'a>], point: DVec3, except: Option<usize>) -> Option<&'b Enclosure<'a>> {
+    let volume = |enclosure: &Enclosure| (enclosure.bounds.max - enclosure.bounds.min).element_product();
+    enclosures
+        .iter()
+        .filter(|enclosure| Some(enclosure.shape) != except && enclosure.contains(point))
+        .min_by(|a, b| volume(a).total_cmp(&volume(b)))
+}
+
+/// Points just outside of a surface.
+fn probes(geometry: &Geometry) -> Vec<DVec3> {
+    match geometry {
+        Geometry::Sphere { center, radius, flipped } => {
+            let distance = radius * if *flipped { 1.0 - 1e-6 } else { 1.0 + 1e-6 };
+            [DVec3::X, DVec3::Y, DVec3::Z]
+                .iter()
+                .flat_map(|axis| [*center + *axis * distance, *center - *axis * distance])
+                .collect()
+        }
+        Geometry::Mesh(mesh) => {
+            let stride = mesh.triangles.len().div_ceil(PROBES).max(1);
+            mesh.triangles.iter().step_by(stride).map(|triangle| outside_of(mesh, triangle)).collect()
+        }
+    }
+}
+
+fn outside_of(mesh: &Mesh, triangle: &[u32; 3]) -> DVec3 {
+    let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize]);
+    let normal = (b - a).cross(c - a).normalize_or_zero();
+    let size = (b - a).length().max((c - a).length());
+    (a + b + c) / 3.0 + normal * size * 1e-6
+}
+
+/// How often a surface winds about a point: 1 inside of a closed surface, −1 if it is inside out, 0 outside.
+pub fn winding_number(geometry: &Geometry, point: DVec3) -> f64 {
+    match geometry {
+        Geometry::Sphere { center, radius, flipped } => {
+            let inside = point.distance(*center) < *radius;
+            f64::from(u8::from(inside)) * if *flipped { -1.0 } else { 1.0 }
+        }
+        Geometry::Mesh(mesh) => {
+            let total: f64 = mesh.triangles.iter().map(|triangle| solid_angle(mesh, triangle, point)).sum();
+            total / (4.0 * std::f64::consts::PI)
+        }
+    }
+}
+
+/// Signed solid angle of a triangle (van Oosterom and Strackee 1983).
+fn solid_angle(mesh: &Mesh, triangle: &[u32; 3], point: DVec3) -> f64 {
+    let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize] - point);
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    2.0 * a.dot(b.cross(c)).atan2(denominator)
+}
