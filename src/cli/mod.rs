@@ -1,0 +1,45 @@
+//! The command line: one module for each command, and what they share.
+//!
+//! Standard output carries results only (the table of `compare`, the list of `devices`); progress, warnings and errors go
+//! to standard error. Errors are printed in one place, in `main`.
+
+use std::fmt::Arguments;
+use std::io::{ErrorKind, Write};
+use std::process::ExitCode;
+
+use clap::Parser;
+
+mod args;
+mod backend;
+mod compare;
+mod devices;
+mod error;
+mod interrupt;
+mod progress;
+mod render;
+
+use args::{Cli, Command};
+pub use error::CliError;
+
+/// Does what the command line asks for. A command line that cannot be understood ends the program with exit code 2.
+pub fn run() -> Result<ExitCode, CliError> {
+    match Cli::parse().command {
+        Command::Render(args) => render::run(&args),
+        Command::Devices => devices::run(),
+        Command::Compare(args) => compare::run(&args),
+    }
+}
+
+/// A line on standard error. If nobody reads it, nobody misses it.
+pub fn say(line: Arguments) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Writes a result to standard output. A reader that has seen enough, such as `head`, is not an error.
+fn print_result(text: &str) -> Result<(), CliError> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(CliError::Output(error)),
+        _ => Ok(()),
+    }
+}
