@@ -23,11 +23,24 @@ pub use error::CliError;
 
 /// Does what the command line asks for. A command line that cannot be understood ends the program with exit code 2.
 pub fn run() -> Result<ExitCode, CliError> {
-    match Cli::parse().command {
+    let command = Cli::parse().command;
+    log_to_stderr(matches!(&command, Command::Render(args) if args.quiet));
+    match command {
         Command::Render(args) => render::run(&args),
         Command::Devices => devices::run(),
         Command::Compare(args) => compare::run(&args),
     }
+}
+
+/// Shows what the library reports on the way: warnings and errors, or errors alone.
+fn log_to_stderr(quiet: bool) {
+    let level = if quiet { tracing::Level::ERROR } else { tracing::Level::WARN };
+    tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false)
+        .init();
 }
 
 /// A line on standard error. If nobody reads it, nobody misses it.

@@ -52,13 +52,10 @@ impl Reporter {
         }
     }
 
-    /// Removes the bar and prints `end`, a line.
-    pub fn finish(self, end: Arguments) {
-        match self {
-            Reporter::Quiet => return,
-            Reporter::Bar(bar) => bar.finish_and_clear(),
-            Reporter::Lines(_) => {}
+    /// Removes the bar, so that whatever is printed next has a clear line.
+    pub fn finish(self) {
+        if let Reporter::Bar(bar) = self {
+            bar.finish_and_clear();
         }
-        super::say(end);
     }
 }

@@ -50,8 +50,10 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
         ),
     );
     let options = Options { samples: 0..spp, time_limit: args.time_limit };
-    let rendered =
-        session::render(&mut *backend, pixels, &options, &interrupt, &mut |progress| reporter.update(progress))?;
+    let report = &mut |progress| reporter.update(progress);
+    let rendered = session::render(&mut *backend, pixels, &options, &interrupt, report);
+    reporter.finish();
+    let rendered = rendered?;
 
     let image = picture::assemble(&scene, &rendered, &device, args.seed);
     exr::write(&output, &image)?;
@@ -59,7 +61,9 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
         preview::write_png(path, &image)?;
     }
 
-    reporter.finish(format_args!("{}", summary(&rendered, &output)));
+    if !args.quiet {
+        super::say(format_args!("{}", summary(&rendered, &output)));
+    }
     let counts = rendered.film.invalid();
     if counts.iter().any(|&count| count > 0) {
         return Err(CliError::InvalidSamples { counts, path: output });
