@@ -2,10 +2,12 @@
 
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
 
 use tyndall::image::{self, exr, preview};
-use tyndall::render::picture;
 use tyndall::render::session::{self, Options, Outcome, Rendered};
+use tyndall::render::{Backend, picture};
+use tyndall::scene::Scene;
 
 use super::args::RenderArgs;
 use super::error::{CliError, STOPPED_EARLY, invalid_samples};
@@ -32,11 +34,23 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
     let spp = args.apply(&mut scene)?;
 
     let mut backend = backend::open(&args.device, &scene, args.seed, spp)?;
+    // From here on a signal leads to an image. Before, it simply ends the program.
+    let interrupt = interrupt::flag()?;
+    render(args, &scene, spp, &mut *backend, &interrupt, &output)
+}
+
+/// Steps 3 to 5 of [`run`], on a device that is open.
+fn render(
+    args: &RenderArgs,
+    scene: &Scene,
+    spp: u32,
+    backend: &mut dyn Backend,
+    interrupt: &AtomicBool,
+    output: &Path,
+) -> Result<ExitCode, CliError> {
     let device = backend.device().clone();
     let crop = scene.film.crop;
     let pixels = crop.width as usize * crop.height as usize;
-    // From here on a signal leads to an image. Before, it simply ends the program.
-    let interrupt = interrupt::flag()?;
     let mut reporter = Reporter::start(
         args.quiet,
         spp,
@@ -50,23 +64,22 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
         ),
     );
     let options = Options { samples: 0..spp, time_limit: args.time_limit };
-    let report = &mut |progress| reporter.update(progress);
-    let rendered = session::render(&mut *backend, pixels, &options, &interrupt, report);
+    let rendered = session::render(backend, pixels, &options, interrupt, &mut |progress| reporter.update(progress));
     reporter.finish();
     let rendered = rendered?;
 
-    let image = picture::assemble(&scene, &rendered, &device, args.seed);
-    exr::write(&output, &image)?;
+    let image = picture::assemble(scene, &rendered, &device, args.seed);
+    exr::write(output, &image)?;
     if let Some(path) = &args.preview {
         preview::write_png(path, &image)?;
     }
 
     if !args.quiet {
-        super::say(format_args!("{}", summary(&rendered, &output)));
+        super::say(format_args!("{}", summary(&rendered, output)));
     }
     let counts = rendered.film.invalid();
     if counts.iter().any(|&count| count > 0) {
-        return Err(CliError::InvalidSamples { counts, path: output });
+        return Err(CliError::InvalidSamples { counts, path: output.to_owned() });
     }
     Ok(match rendered.outcome {
         Outcome::Finished | Outcome::TimeLimit => ExitCode::SUCCESS,
@@ -116,4 +129,99 @@ fn summary(rendered: &Rendered, output: &Path) -> String {
         output.display(),
         invalid_samples(&film.invalid()),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::Range;
+
+    use clap::Parser;
+    use glam::DVec3;
+    use tyndall::render::{BackendError, Block, DeviceInfo};
+    use tyndall::scene::{Camera, Film};
+
+    use super::super::args::{Cli, Command};
+    use super::*;
+
+    /// A device whose every sample is `value`, and which says that `invalid` of a block were invalid.
+    struct Flat {
+        device: DeviceInfo,
+        value: f32,
+        invalid: [u64; 3],
+        lost: bool,
+    }
+
+    impl Backend for Flat {
+        fn device(&self) -> &DeviceInfo {
+            &self.device
+        }
+
+        fn render(&mut self, samples: Range<u32>) -> Result<Vec<Block>, BackendError> {
+            if self.lost {
+                return Err(BackendError { device: "flat".to_owned(), cause: "lost".to_owned() });
+            }
+            let block = |first: u32| {
+                let count = 16.min(samples.end - first);
+                let sum = vec![[count as f32 * self.value; 3]; 6];
+                Block { first, count, squares: sum.clone(), sums: sum, invalid: self.invalid }
+            };
+            Ok(samples.clone().step_by(16).map(block).collect())
+        }
+    }
+
+    /// Renders 3×2 pixels into a file and returns its path as well, in a directory that goes with it.
+    fn render_flat(
+        value: f32,
+        invalid: [u64; 3],
+        lost: bool,
+        interrupted: bool,
+    ) -> (Result<ExitCode, CliError>, std::path::PathBuf, tempfile::TempDir) {
+        let directory = tempfile::tempdir().unwrap();
+        let output = directory.path().join("a.exr");
+        let Command::Render(args) = Cli::try_parse_from(["tyndall", "render", "a.xml", "-q"]).unwrap().command else {
+            unreachable!()
+        };
+        let scene = Scene::new(Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 40.0), Film::new(3, 2));
+        let device = DeviceInfo { name: "flat".to_owned(), driver: "none".to_owned() };
+        let mut backend = Flat { device, value, invalid, lost };
+        let result = render(&args, &scene, 40, &mut backend, &AtomicBool::new(interrupted), &output);
+        (result, output, directory)
+    }
+
+    /// Exit codes can be printed but not compared.
+    fn code(result: Result<ExitCode, CliError>) -> String {
+        format!("{:?}", result.unwrap_or_else(|error| error.exit_code()))
+    }
+
+    #[test]
+    fn a_good_render_succeeds() {
+        let (result, output, _directory) = render_flat(0.5, [0; 3], false, false);
+        assert_eq!(code(result), format!("{:?}", ExitCode::SUCCESS));
+        assert_eq!(exr::read(&output).unwrap().channel("G"), Some([0.5; 6].as_slice()));
+    }
+
+    #[test]
+    fn an_interrupted_render_writes_what_it_has() {
+        let (result, output, _directory) = render_flat(0.5, [0; 3], false, true);
+        assert_eq!(code(result), format!("{:?}", ExitCode::from(75)));
+        assert_eq!(exr::read(&output).unwrap().channel("sampleCount"), Some([16.0; 6].as_slice()));
+    }
+
+    #[test]
+    fn invalid_samples_fail_the_render_after_the_image_is_written() {
+        for interrupted in [false, true] {
+            let (result, output, _directory) = render_flat(f32::NAN, [2, 0, 0], false, interrupted);
+            let blocks = if interrupted { 1 } else { 3 };
+            assert!(matches!(result, Err(CliError::InvalidSamples { counts, .. }) if counts == [2 * blocks, 0, 0]));
+            assert_eq!(code(result), format!("{:?}", ExitCode::from(1)));
+            assert!(exr::read(&output).unwrap().channel("R").unwrap()[0].is_nan());
+        }
+    }
+
+    #[test]
+    fn a_lost_device_fails_the_render() {
+        let (result, output, _directory) = render_flat(0.5, [0; 3], true, false);
+        assert_eq!(code(result), format!("{:?}", ExitCode::from(1)));
+        assert!(!output.exists());
+    }
 }
