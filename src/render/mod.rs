@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 pub mod film;
+pub mod picture;
+pub mod scene_hash;
 pub mod session;
 
 /// Samples a pixel in one block. Blocks are aligned: block `k` holds the samples `16 k .. 16 k + 16`.

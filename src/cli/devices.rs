@@ -1,0 +1,18 @@
+//! `tyndall devices`: what `--device` can name.
+
+use std::fmt::Write;
+use std::process::ExitCode;
+
+use super::backend;
+use super::error::CliError;
+
+/// Prints a line for each device: number, name, driver.
+pub fn run() -> Result<ExitCode, CliError> {
+    let mut text = String::new();
+    for (index, device) in backend::list()?.iter().enumerate() {
+        writeln!(text, "{index:<9}  {}  ({})", device.name, device.driver).expect("a string takes any text");
+    }
+    writeln!(text, "reference  the CPU, in double precision").expect("a string takes any text");
+    super::print_result(&text)?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,162 @@
+//! How far an image is from a reference.
+//!
+//! With x the image, r the reference, q one of `R G B`, and d = x − r:
+//! - MSE: the mean of d² over pixels and channels.
+//! - relMSE: the mean over pixels of (1/3) Σ_q d_q² / (r_q² + e²), where e is a tenth of the mean of r over all pixels and
+//!   channels, so that dark pixels do not decide the sum (relative errors with such a term: Rousselle et al. 2011,
+//!   "Adaptive Sampling and Reconstruction using Greedy Error Minimization").
+//! - trimmed relMSE: the same over the 99 % of pixels with the smallest error, so that a few fireflies do not decide it.
+//! - z of a channel: mean(d) / (std(d) / √N), the mean difference in units of its own standard error, as it follows from
+//!   the scatter of d over the N pixels, with the noise of both images in it. A |z| above 4 or so is a bias.
+//!
+//! All sums are in double precision.
+
+use super::Image;
+
+/// Fraction of the reference's mean that is added (in square) to the denominator of relMSE.
+const FLOOR: f64 = 0.1;
+
+/// The differences between an image and a reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comparison {
+    /// Mean square error.
+    pub mse: f64,
+    /// Mean relative square error.
+    pub rel_mse: f64,
+    /// Mean relative square error without the worst 1 % of pixels.
+    pub trimmed_rel_mse: f64,
+    /// Of `R`, `G` and `B`.
+    pub channels: [Difference; 3],
+    /// Of the mean over the three channels.
+    pub mean: Difference,
+}
+
+/// The mean difference of one channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// Mean of the image.
+    pub image: f64,
+    /// Mean of the reference.
+    pub reference: f64,
+    /// Mean of image − reference.
+    pub difference: f64,
+    /// The mean difference divided by its standard error; 0 if both are 0, infinite if only the latter is.
+    pub z: f64,
+}
+
+/// Images that cannot be compared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MetricsError {
+    /// The two differ in size.
+    #[error("the image has {}×{} pixels but the reference {}×{}", image.0, image.1, reference.0, reference.1)]
+    Size {
+        /// Width and height of the image.
+        image: (usize, usize),
+        /// Width and height of the reference.
+        reference: (usize, usize),
+    },
+    /// There are no pixels.
+    #[error("the images have no pixels")]
+    Empty,
+    /// One of the two lacks red, green or blue.
+    #[error("the {which} has no channel {channel}")]
+    MissingChannel {
+        /// "image" or "reference".
+        which: &'static str,
+        /// The name of the channel.
+        channel: &'static str,
+    },
+    /// A sample is not a number that one could compare.
+    #[error("the {which} is {value} at pixel ({x}, {y}), channel {channel}")]
+    NotFinite {
+        /// "image" or "reference".
+        which: &'static str,
+        /// The name of the channel.
+        channel: &'static str,
+        /// Column, from the left edge of the image.
+        x: usize,
+        /// Row, from the top edge of the image.
+        y: usize,
+        /// NaN or an infinity.
+        value: f32,
+    },
+}
+
+/// Measures how far `image` is from `reference`.
+pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, MetricsError> {
+    let (size, reference_size) = ((image.width, image.height), (reference.width, reference.height));
+    if size != reference_size {
+        return Err(MetricsError::Size { image: size, reference: reference_size });
+    }
+    let pixels = image.width * image.height;
+    if pixels == 0 {
+        return Err(MetricsError::Empty);
+    }
+    let x = finite_rgb(image, "image")?;
+    let r = finite_rgb(reference, "reference")?;
+
+    let reference_mean = r.iter().map(|channel| mean(channel.iter().map(|&v| f64::from(v)))).sum::<f64>() / 3.0;
+    let floor = (FLOOR * reference_mean).powi(2);
+    let mut square_sum = 0.0;
+    let mut relative: Vec<f64> = (0..pixels)
+        .map(|pixel| {
+            let mut sum = 0.0;
+            for q in 0..3 {
+                let reference = f64::from(r[q][pixel]);
+                let square = (f64::from(x[q][pixel]) - reference).powi(2);
+                square_sum += square;
+                // Black on a black reference is no error; anything else there is an infinite one.
+                if square > 0.0 {
+                    sum += square / (reference.powi(2) + floor);
+                }
+            }
+            sum / 3.0
+        })
+        .collect();
+    let rel_mse = mean(relative.iter().copied());
+    relative.sort_unstable_by(f64::total_cmp);
+    let kept = (99 * pixels).div_ceil(100);
+
+    let triple = |images: &[&[f32]; 3], pixel: usize| images.map(|channel| f64::from(channel[pixel]));
+    let average = |images: &[&[f32]; 3], pixel| triple(images, pixel).iter().sum::<f64>() / 3.0;
+    Ok(Comparison {
+        mse: square_sum / (3 * pixels) as f64,
+        rel_mse,
+        trimmed_rel_mse: mean(relative[..kept].iter().copied()),
+        channels: [0, 1, 2].map(|q| difference(pixels, |p| f64::from(x[q][p]), |p| f64::from(r[q][p]))),
+        mean: difference(pixels, |p| average(&x, p), |p| average(&r, p)),
+    })
+}
+
+/// The mean difference of one channel and its significance.
+fn difference(pixels: usize, image: impl Fn(usize) -> f64, reference: impl Fn(usize) -> f64) -> Difference {
+    let difference = |pixel| image(pixel) - reference(pixel);
+    let mean_difference = mean((0..pixels).map(difference));
+    let squares: f64 = (0..pixels).map(|pixel| (difference(pixel) - mean_difference).powi(2)).sum();
+    // The sample variance needs two pixels; with one there is no scatter to be seen.
+    let variance = squares / (pixels.max(2) - 1) as f64;
+    let standard_error = (variance / pixels as f64).sqrt();
+    let z = if mean_difference == 0.0 { 0.0 } else { mean_difference / standard_error };
+    Difference {
+        image: mean((0..pixels).map(&image)),
+        reference: mean((0..pixels).map(&reference)),
+        difference: mean_difference,
+        z,
+    }
+}
+
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    values.sum::<f64>() / count
+}
+
+fn finite_rgb<'a>(image: &'a Image, which: &'static str) -> Result<[&'a [f32]; 3], MetricsError> {
+    let rgb = image.rgb().map_err(|channel| MetricsError::MissingChannel { which, channel })?;
+    for (channel, samples) in ["R", "G", "B"].into_iter().zip(rgb) {
+        if let Some(pixel) = samples.iter().position(|value| !value.is_finite()) {
+            let (x, y) = (pixel % image.width, pixel / image.width);
+            return Err(MetricsError::NotFinite { which, channel, x, y, value: samples[pixel] });
+        }
+    }
+    Ok(rgb)
+}
