@@ -57,8 +57,11 @@ pub struct Variant {
     pub buffer_reference: bool,
 }
 
-/// Expands a kernel of this crate.
+/// Expands a kernel of this crate, or of the folder that `TYNDALL_SHADERS` names: for work on the kernels without building anew.
 pub fn expand(name: &str, variant: &Variant) -> Result<ShaderSourceText, Error> {
+    if let Some(folder) = std::env::var_os("TYNDALL_SHADERS") {
+        return expand_with(name, variant, &|path| std::fs::read_to_string(PathBuf::from(&folder).join(path)).ok());
+    }
     expand_with(name, variant, &|path| SOURCES.iter().find(|(file, _)| *file == path).map(|(_, text)| (*text).to_owned()))
 }
 
@@ -76,6 +79,8 @@ pub fn expand_with(
     };
     let mut head = String::from("#version 460\n#extension GL_GOOGLE_cpp_style_line_directive : require\n");
     head += "#extension GL_EXT_control_flow_attributes : require\n";
+    head += "#extension GL_KHR_shader_subgroup_ballot : require\n";
+    head += "#extension GL_KHR_shader_subgroup_arithmetic : require\n";
     head += &format!("#define WORKGROUP {}u\n", variant.workgroup);
     if variant.buffer_reference {
         head += "#define USE_BUFFER_REFERENCE\n#extension GL_EXT_buffer_reference : require\n";

@@ -17,8 +17,9 @@ use obvhs::{Boundable, BvhBuildParams};
 
 /// Most primitives in a leaf: the count has three bits.
 const MAX_LEAF: u32 = 8;
-/// Eight copies of the tree are made as long as they take no more than this, in bytes.
-const MAX_COPIES_SIZE: usize = 64 << 20;
+/// Eight copies of the tree are made as long as they take no more than this, in bytes: they must stay in a processor's own
+/// caches. Beyond, a single copy costs 3 % more steps but a third less time (measured on 20,480 triangles).
+const MAX_COPIES_SIZE: usize = 128 << 10;
 /// Bits of a leaf's first primitive.
 const FIRST_BITS: u32 = 28;
 /// Most primitives that a tree can hold.
