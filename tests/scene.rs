@@ -4,6 +4,8 @@
 
 #[path = "scene/bad_input.rs"]
 mod bad_input;
+#[path = "scene/docs.rs"]
+mod docs;
 #[path = "scene/features.rs"]
 mod features;
 #[path = "scene/files.rs"]

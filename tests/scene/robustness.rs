@@ -46,6 +46,28 @@ fn operation() -> impl Strategy<Value = (String, DMat4)> {
     ]
 }
 
+/// Whether the operations move a rectangle like a matrix does.
+fn agrees(operations: &str, expected: DMat4) -> bool {
+    let s = scene(&format!(
+        r#"<shape type="rectangle"><bsdf type="twosided"><bsdf type="diffuse"/></bsdf><transform name="to_world">{operations}</transform></shape>"#
+    ));
+    let Geometry::Mesh(mesh) = &s.shapes[0].geometry else { return false };
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    corners.iter().zip(&mesh.positions).all(|(&(x, y), got)| {
+        let want = expected.transform_point3(DVec3::new(x, y, 0.0));
+        (*got - want).length() <= 1e-11 * (1.0 + want.length())
+    })
+}
+
+#[test]
+fn the_comparison_of_transforms_can_fail() {
+    let (move_x, double) = (DMat4::from_translation(DVec3::X), DMat4::from_scale(DVec3::splat(2.0)));
+    let xml = r#"<translate x="1"/><scale value="2"/>"#;
+    assert!(agrees(xml, double * move_x));
+    assert!(!agrees(xml, move_x * double), "the wrong order");
+    assert!(!agrees(xml, double * move_x * DMat4::from_rotation_z(1e-9)), "a small rotation");
+}
+
 proptest! {
     #![proptest_config(config())]
 
@@ -53,14 +75,7 @@ proptest! {
     fn transforms_agree_with_glam(operations in prop::collection::vec(operation(), 0..6)) {
         let xml: String = operations.iter().map(|(xml, _)| xml.as_str()).collect();
         let expected = operations.iter().fold(DMat4::IDENTITY, |total, (_, step)| *step * total);
-        let s = scene(&format!(
-            r#"<shape type="rectangle"><bsdf type="twosided"><bsdf type="diffuse"/></bsdf><transform name="to_world">{xml}</transform></shape>"#
-        ));
-        let Geometry::Mesh(mesh) = &s.shapes[0].geometry else { panic!() };
-        for (corner, got) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].iter().zip(&mesh.positions) {
-            let want = expected.transform_point3(DVec3::new(corner.0, corner.1, 0.0));
-            prop_assert!((*got - want).length() <= 1e-11 * (1.0 + want.length()), "{} instead of {}", got, want);
-        }
+        prop_assert!(agrees(&xml, expected), "{} is not {}", xml, expected);
     }
 
     #[test]
