@@ -216,7 +216,7 @@ fn what_is_read_differently_warns_with_its_place() {
             ":2:1: ",
             "<bsdf type=\"null\"/>",
         ),
-        (&SENSOR.replace("box", "box"), ":2:1: ", "the first of 2 sensors is used"),
+        (SENSOR, ":2:1: ", "the first of 2 sensors is used"),
         (
             r#"<shape type="obj"><string name="filename" value="meshes/ball.obj"/></shape>"#,
             ":2:1: ",
