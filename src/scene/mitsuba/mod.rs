@@ -10,6 +10,7 @@ use super::{Scene, SceneError};
 
 mod bsdf;
 mod build;
+mod element;
 mod emitter;
 mod film;
 mod integrator;

@@ -5,7 +5,7 @@ use glam::{DMat3, DMat4, DVec3};
 use super::build::Context;
 use super::props::{Child, Props, unknown_plugin};
 use super::tree::Kind;
-use super::{bsdf, emitter, xml};
+use super::{bsdf, emitter, source};
 use crate::scene::mesh::{self, obj};
 use crate::scene::{Boundary, Bsdf, Geometry, Mesh, SceneError, Shape};
 
@@ -188,7 +188,7 @@ fn triangles<'a>(
     props.ignore_boolean("flip_tex_coords")?;
     let to_world = to_world(props)?;
 
-    let path = xml::find(&filename.value, child.object.folders.iter());
+    let path = source::find(&filename.value, child.object.folders.iter());
     let shown = path.display().to_string();
     let bytes =
         std::fs::read(&path).map_err(|cause| filename.at.error(format!("cannot read the mesh {shown}: {cause}")))?;

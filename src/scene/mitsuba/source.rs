@@ -1,9 +1,23 @@
-//! The text of one scene file, and lines and columns in it.
+//! Files: where they are found, their text, and lines and columns in it.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::scene::SceneError;
 use crate::scene::error::Location;
+
+/// The first of `folders` that has the file; the nearest one if none has it.
+pub(super) fn find<'a>(name: &str, folders: impl Iterator<Item = &'a PathBuf>) -> PathBuf {
+    let mut nearest = None;
+    for folder in folders {
+        let path = folder.join(name);
+        if path.exists() {
+            return path;
+        }
+        nearest.get_or_insert(path);
+    }
+    nearest.unwrap_or_else(|| PathBuf::from(name))
+}
 
 /// Bytes as text; a byte that is not UTF-8 is an error with its place.
 pub(super) fn read_text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, SceneError> {

@@ -91,7 +91,7 @@ mod tests {
         assert_eq!(rgb(" 1, 2 ,3"), Ok(DVec3::new(1.0, 2.0, 3.0)));
         assert_eq!(rgb("#ff0000"), Ok(DVec3::X));
         // IEC 61966-2-1: code 188 of 255 is 0.502886 of white.
-        let gray = rgb("#bcBCbc").unwrap();
+        let gray = rgb("#bcBCbc").expect("a colour");
         assert!((gray - DVec3::splat(0.502_886_458)).length() < 1e-8, "{gray}");
         for bad in ["", "1 2", "1 2 3 4", "#ff00", "#gg0000", "#+10000", "NaN", "1e999", "1;2;3"] {
             assert!(rgb(bad).is_err(), "{bad}");

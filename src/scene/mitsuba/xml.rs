@@ -7,13 +7,13 @@ use std::sync::Arc;
 use glam::DMat4;
 use roxmltree::{Document, Node};
 
+use super::element::{Attribute, Element, check_version, refuse_children, refuse_text};
 use super::params::Parameters;
-use super::source::{Source, read_text};
+use super::source::{Source, find, read_text};
 use super::suggest::{did_you_mean, list};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
 use super::{transform, values};
 use crate::scene::SceneError;
-use crate::scene::error::Location;
 
 /// Deepest nesting of objects, and of files that include each other. Real scenes need about five levels; the limit
 /// keeps a malicious file from exhausting the stack.
@@ -54,48 +54,6 @@ struct Host {
     /// The `name` on the `<include>`.
     name: Option<String>,
     depth: usize,
-}
-
-/// An attribute after `$name` has been replaced.
-struct Attribute {
-    name: String,
-    value: String,
-    at: Location,
-}
-
-/// An element with its attributes; looks them up and complains about those that nobody knows.
-struct Element<'a, 'input> {
-    node: Node<'a, 'input>,
-    tag: String,
-    at: Location,
-    attributes: Vec<Attribute>,
-}
-
-impl Element<'_, '_> {
-    fn attribute(&self, name: &str) -> Option<&Attribute> {
-        self.attributes.iter().find(|a| a.name == name)
-    }
-
-    fn get(&self, name: &str) -> Option<&str> {
-        self.attribute(name).map(|a| a.value.as_str())
-    }
-
-    fn required(&self, name: &str) -> Result<&Attribute, SceneError> {
-        self.attribute(name).ok_or_else(|| self.at.error(format!("<{}> needs the attribute \"{name}\"", self.tag)))
-    }
-
-    fn allow(&self, allowed: &[&'static str]) -> Result<(), SceneError> {
-        match self.attributes.iter().find(|a| !allowed.contains(&a.name.as_str())) {
-            None => Ok(()),
-            Some(a) => Err(a.at.error(format!(
-                "<{}> has no attribute \"{}\"{}; accepted: {}",
-                self.tag,
-                a.name,
-                did_you_mean(&a.name, allowed.iter().copied()),
-                list(allowed.iter().copied())
-            ))),
-        }
-    }
 }
 
 impl Reader {
@@ -411,51 +369,4 @@ impl Reader {
         }
         Ok(())
     }
-}
-
-/// The first of `folders` that has the file; the nearest one if none has it.
-pub(super) fn find<'a>(name: &str, folders: impl Iterator<Item = &'a PathBuf>) -> PathBuf {
-    let mut nearest = None;
-    for folder in folders {
-        let path = folder.join(name);
-        if path.exists() {
-            return path;
-        }
-        nearest.get_or_insert(path);
-    }
-    nearest.unwrap_or_else(|| PathBuf::from(name))
-}
-
-/// Mitsuba's dialects that are known: 0.6, 2 and 3.
-fn check_version(root: &Element) -> Result<(), SceneError> {
-    let version = root.required("version")?;
-    let mut numbers = version.value.split('.').map(str::parse::<u32>);
-    match (numbers.next(), numbers.all(|n| n.is_ok())) {
-        (Some(Ok(0 | 2 | 3)), true) => Ok(()),
-        _ => Err(version.at.error(format!(
-            "\"{}\" is not a version of the scene format that is supported; supported: 0.x, 2.x and 3.x",
-            version.value
-        ))),
-    }
-}
-
-fn refuse_children(source: &Source, element: &Element) -> Result<(), SceneError> {
-    for node in element.node.children() {
-        if node.is_element() {
-            let at = source.location(node.range().start);
-            return Err(at.error(format!("<{}> cannot have children", element.tag)));
-        }
-        refuse_text(source, node)?;
-    }
-    Ok(())
-}
-
-fn refuse_text(source: &Source, node: Node) -> Result<(), SceneError> {
-    let text = node.text().unwrap_or_default();
-    if !node.is_text() || text.trim().is_empty() {
-        return Ok(());
-    }
-    let blank = text.len() - text.trim_start().len();
-    let at = source.location(node.range().start + blank);
-    Err(at.error("text between elements has no meaning; values are given as attributes"))
 }
