@@ -94,8 +94,9 @@ fn candidates(loader: &Loader) -> Result<Vec<Candidate>, Error> {
 
 fn describe(loader: &Loader, physical: vk::PhysicalDevice) -> Candidate {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
-    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
-    // SAFETY: only queries; a device older than 1.2 leaves the driver's structure as it is.
+    let mut subgroups = vk::PhysicalDeviceSubgroupProperties::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroups);
+    // SAFETY: only queries; a device older than 1.2 leaves structures that it does not know as they are.
     unsafe { loader.instance.get_physical_device_properties2(physical, &mut properties) };
     let properties = properties.properties;
     // SAFETY: only a query.
@@ -118,6 +119,8 @@ fn describe(loader: &Loader, physical: vk::PhysicalDevice) -> Candidate {
         Some(format!("Vulkan {}.{}, 1.2 is needed", vk::api_version_major(version), vk::api_version_minor(version)))
     } else if queue_family.is_none() {
         Some("no compute queue".to_owned())
+    } else if !subgroups.supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC) {
+        Some("no arithmetic across subgroups".to_owned())
     } else if driver.driver_id == vk::DriverId::MESA_LLVMPIPE && mesa.is_some_and(|major| major < OLDEST_LAVAPIPE) {
         Some(format!("this lavapipe renders wrong images, Mesa {OLDEST_LAVAPIPE} or newer is needed"))
     } else {

@@ -79,7 +79,6 @@ pub fn expand_with(
     };
     let mut head = String::from("#version 460\n#extension GL_GOOGLE_cpp_style_line_directive : require\n");
     head += "#extension GL_EXT_control_flow_attributes : require\n";
-    head += "#extension GL_KHR_shader_subgroup_ballot : require\n";
     head += "#extension GL_KHR_shader_subgroup_arithmetic : require\n";
     head += &format!("#define WORKGROUP {}u\n", variant.workgroup);
     if variant.buffer_reference {
