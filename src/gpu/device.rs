@@ -41,7 +41,10 @@ struct Loader {
 /// The loader lives as long as the process: devices of several renders and tests share it.
 fn loader() -> Result<&'static Loader, Error> {
     static LOADER: OnceLock<Result<Loader, String>> = OnceLock::new();
-    LOADER.get_or_init(|| open_loader().map_err(|error| error.to_string())).as_ref().map_err(|cause| Error::NoLoader(cause.clone()))
+    LOADER
+        .get_or_init(|| open_loader().map_err(|error| error.to_string()))
+        .as_ref()
+        .map_err(|cause| Error::NoLoader(cause.clone()))
 }
 
 /// Tells lavapipe to use the widest vectors that the processor has. Mesa keeps compiled kernels in a cache whose key does not
@@ -197,7 +200,11 @@ impl Device {
             buffer_device_address: buffer_reference,
             allocation_sizes: Default::default(),
         })
-        .map_err(|cause| Error::Memory { name: "the allocator".to_owned(), size: 0, cause: cause.to_string() })?;
+        .map_err(|cause| Error::Memory {
+            name: "the allocator".to_owned(),
+            size: 0,
+            cause: cause.to_string(),
+        })?;
         // SAFETY: the queue was asked for above.
         let queue = unsafe { raw.get_device_queue(candidate.queue_family, 0) };
         Ok(Arc::new(Device {

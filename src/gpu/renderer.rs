@@ -69,7 +69,11 @@ impl Renderer {
             tables,
             params: Buffer::new(device, "params", &[packed.params])?,
             samples: Buffer::zeroed::<[f32; 4]>(device, "samples", capacity)?,
-            sums: Buffer::zeroed::<[f32; 4]>(device, "sums", 2 * capacity.div_ceil(BLOCK_SAMPLES as usize) + pixels.min(capacity) * 2)?,
+            sums: Buffer::zeroed::<[f32; 4]>(
+                device,
+                "sums",
+                2 * capacity.div_ceil(BLOCK_SAMPLES as usize) + pixels.min(capacity) * 2,
+            )?,
             invalid: Buffer::zeroed::<[u32; 4]>(device, "invalid", capacity / TILE_PIXELS)?,
             crop,
             capacity,

@@ -62,7 +62,9 @@ pub fn expand(name: &str, variant: &Variant) -> Result<ShaderSourceText, Error> 
     if let Some(folder) = std::env::var_os("TYNDALL_SHADERS") {
         return expand_with(name, variant, &|path| std::fs::read_to_string(PathBuf::from(&folder).join(path)).ok());
     }
-    expand_with(name, variant, &|path| SOURCES.iter().find(|(file, _)| *file == path).map(|(_, text)| (*text).to_owned()))
+    expand_with(name, variant, &|path| {
+        SOURCES.iter().find(|(file, _)| *file == path).map(|(_, text)| (*text).to_owned())
+    })
 }
 
 /// Expands a kernel whose files come from `find`; the generated ones are added.
@@ -170,5 +172,6 @@ fn write_whole(folder: &std::path::Path, path: &std::path::Path, bytes: &[u8]) -
 /// `$XDG_CACHE_HOME/tyndall`, or `~/.cache/tyndall`.
 pub fn cache_folder() -> Option<PathBuf> {
     let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|path| path.is_absolute());
-    base.or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache"))).map(|base| base.join("tyndall"))
+    base.or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")))
+        .map(|base| base.join("tyndall"))
 }

@@ -105,7 +105,13 @@ impl Bvh {
     /// A tree that no ray hits.
     fn empty() -> Bvh {
         // An inner node whose near bounds lie behind its far bounds.
-        Bvh { nodes: vec![[0xffff, 0xffff, 0xffff, 1]; 8], node_count: 1, copies: 8, grid_origin: Vec3::ZERO, grid_step: Vec3::ONE }
+        Bvh {
+            nodes: vec![[0xffff, 0xffff, 0xffff, 1]; 8],
+            node_count: 1,
+            copies: 8,
+            grid_origin: Vec3::ZERO,
+            grid_step: Vec3::ONE,
+        }
     }
 }
 

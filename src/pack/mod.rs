@@ -107,8 +107,7 @@ impl Packed {
         };
         let warnings = nesting.warnings;
         let features = EMPTY_FEATURES;
-        let mut packed =
-            Packed { frame, bvh, primitives, surfaces, media, lights, params, features, warnings };
+        let mut packed = Packed { frame, bvh, primitives, surfaces, media, lights, params, features, warnings };
         packed.features = Features::of(scene, &packed);
         Ok(packed)
     }
