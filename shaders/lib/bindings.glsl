@@ -10,6 +10,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pr
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer SurfacesAddress { Surface at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MediaAddress { Medium at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LightsAddress { Light at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PointsAddress { uvec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer SamplesAddress { vec4 at[]; };
 layout(push_constant) uniform Push {
     NodesAddress nodes;
@@ -17,7 +18,9 @@ layout(push_constant) uniform Push {
     SurfacesAddress surfaces;
     MediaAddress media;
     LightsAddress lights;
+    PointsAddress points;
     SamplesAddress samples;
+    uvec2 unused;
     Dispatch work;
 } push;
 #define NODE(i) push.nodes.at[i]
@@ -25,6 +28,7 @@ layout(push_constant) uniform Push {
 #define SURFACE(i) push.surfaces.at[i]
 #define MEDIUM(i) push.media.at[i]
 #define LIGHT(i) push.lights.at[i]
+#define POINT(i) push.points.at[i]
 #define SAMPLE(i) push.samples.at[i]
 #else
 layout(set = 0, binding = 0, std430) readonly buffer Nodes { uvec4 nodes[]; };
@@ -32,9 +36,10 @@ layout(set = 0, binding = 1, std430) readonly buffer Primitives { Primitive prim
 layout(set = 0, binding = 2, std430) readonly buffer Surfaces { Surface surfaces[]; };
 layout(set = 0, binding = 3, std430) readonly buffer Media { Medium media[]; };
 layout(set = 0, binding = 4, std430) readonly buffer Lights { Light lights[]; };
-layout(set = 0, binding = 5, std430) writeonly buffer Samples { vec4 samples[]; };
+layout(set = 0, binding = 5, std430) readonly buffer Points { uvec2 points[]; };
+layout(set = 0, binding = 6, std430) writeonly buffer Samples { vec4 samples[]; };
 layout(push_constant) uniform Push {
-    uvec4 addresses[3];
+    uvec4 addresses[4];
     Dispatch work;
 } push;
 #define NODE(i) nodes[i]
@@ -42,6 +47,7 @@ layout(push_constant) uniform Push {
 #define SURFACE(i) surfaces[i]
 #define MEDIUM(i) media[i]
 #define LIGHT(i) lights[i]
+#define POINT(i) points[i]
 #define SAMPLE(i) samples[i]
 #endif
-layout(set = 0, binding = 6, std430) readonly buffer ParamsBuffer { Params params; };
+layout(set = 0, binding = 7, std430) readonly buffer ParamsBuffer { Params params; };

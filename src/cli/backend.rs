@@ -16,15 +16,9 @@ pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Loaded, CliEr
 }
 
 /// Opens the device that `choice` names ("auto" for the best one, a part of its name, its number in [`list`], or "reference"
-/// for the CPU) and prepares it for the crop window of `scene` and for samples `0..spp`. Warnings go to `warn`.
-pub fn open(
-    choice: &str,
-    scene: &Scene,
-    seed: u32,
-    spp: u32,
-    warn: &mut dyn FnMut(&str),
-) -> Result<Box<dyn Backend>, CliError> {
-    let packed = Packed::new(scene, seed, spp).map_err(|error| CliError::Scene(error.to_string()))?;
+/// for the CPU) and prepares it for the crop window of `scene`. Warnings go to `warn`.
+pub fn open(choice: &str, scene: &Scene, seed: u32, warn: &mut dyn FnMut(&str)) -> Result<Box<dyn Backend>, CliError> {
+    let packed = Packed::new(scene, seed).map_err(|error| CliError::Scene(error.to_string()))?;
     packed.warnings.iter().for_each(|warning| warn(warning));
     if choice == "reference" {
         return Err(CliError::NoDevice("soon".into()));

@@ -34,7 +34,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
     let mut scene = loaded.scene;
     let spp = args.apply(&mut scene)?;
 
-    let mut backend = backend::open(&args.device, &scene, args.seed, spp, &mut warn)?;
+    let mut backend = backend::open(&args.device, &scene, args.seed, &mut warn)?;
     // From here on a signal leads to an image. Before, it simply ends the program.
     let interrupt = interrupt::flag()?;
     render(args, &scene, spp, &mut *backend, &interrupt, &output)

@@ -1,7 +1,7 @@
 //! From GLSL to SPIR-V: includes, generated files, the compiler, and a cache.
 
 use super::Error;
-use crate::pack::{features::Features, layout, sobol};
+use crate::pack::{features::Features, layout};
 use glslang::{
     Compiler, CompilerOptions, Shader, ShaderInput, ShaderSource, ShaderStage, SpirvVersion, Target, VulkanVersion,
 };
@@ -76,7 +76,6 @@ pub fn expand_with(
     let generated = |path: &str| match path {
         "lib/layout.glsl" => Some(layout::glsl()),
         "lib/features.glsl" => Some(variant.features.glsl()),
-        "lib/sobol.glsl" => Some(sobol::glsl()),
         _ => find(path),
     };
     let mut head = String::from("#version 460\n#extension GL_GOOGLE_cpp_style_line_directive : require\n");
