@@ -216,7 +216,9 @@ fn eval_scattering(vertex: &Vertex, direction: DVec3) -> f64 {
 fn sample_scattering(vertex: &Vertex, u: DVec2) -> DVec3 {
     if vertex.in_medium {
         let angle = sample_henyey_greenstein(vertex.g, u.x);
-        return from_frame(vertex.axis, from_polar(angle.cos_theta, angle.sin_theta, u.y));
+        let local = from_polar(angle.cos_theta, angle.sin_theta, u.y);
+        // For g = 0 no axis matters; the kernel leaves the frame out where it knows no other g.
+        return if vertex.g == 0.0 { local } else { from_frame(vertex.axis, local) };
     }
     from_frame(vertex.axis, square_to_cosine_hemisphere(u))
 }
@@ -424,7 +426,8 @@ pub fn test_primitive(tables: &Tables, path: &Path, ray: &Ray, index: u32, hit: 
     let primitive = tables.primitive(index);
     if primitive.surface & PRIMITIVE_SPHERE != 0 {
         let t = intersect_sphere(ray, primitive.a, primitive.b.x);
-        if t.x <= t.y {
+        // A ray that touches the sphere in one point does not cross it.
+        if t.x < t.y {
             let outwards = primitive.b.y > 0.0;
             let near = Crossing { t: t.x, along_normal: !outwards, barycentric: DVec2::ZERO };
             let far = Crossing { t: t.y, along_normal: outwards, barycentric: DVec2::ZERO };

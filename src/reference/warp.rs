@@ -14,7 +14,7 @@ pub fn from_polar(z: f64, sin_theta: f64, u: f64) -> DVec3 {
 
 /// Uniform over the sphere of directions.
 pub fn square_to_sphere(u: DVec2) -> DVec3 {
-    let z = 1.0 - 2.0 * u.x;
+    let z = 2.0 * u.x - 1.0;
     from_polar(z, 2.0 * (u.x * (1.0 - u.x)).sqrt(), u.y)
 }
 
