@@ -205,7 +205,10 @@ vec3 sample_scattering(Vertex vertex, vec2 u) {
     if (HAS_MEDIA && vertex.in_medium) {
         if (HAS_HENYEY_GREENSTEIN) {
             PhaseAngle angle = sample_henyey_greenstein(vertex.g, u.x);
-            return from_frame(vertex.axis, from_polar(angle.cos_theta, angle.sin_theta, u.y));
+            vec3 local = from_polar(angle.cos_theta, angle.sin_theta, u.y);
+            // For g = 0 this is square_to_sphere(u), to the last bit, and no axis matters: so kernels with and without
+            // Henyey and Greenstein's function render the same image.
+            return vertex.g == 0.0 ? local : from_frame(vertex.axis, local);
         }
         return square_to_sphere(u);
     }
@@ -430,7 +433,8 @@ void test_primitive(Path path, Ray ray, uint index, inout Hit hit) {
     Primitive primitive = PRIMITIVE(index);
     if (HAS_SPHERES && (primitive.surface & PRIMITIVE_SPHERE) != 0u) {
         vec2 t = intersect_sphere(ray, primitive.a, primitive.b.x);
-        if (t.x <= t.y) {
+        // A ray that touches the sphere in one point does not cross it: two crossings at one distance would count as one.
+        if (t.x < t.y) {
             bool outwards = primitive.b.y > 0.0;
             record(path, index, primitive, t.x, !outwards, vec2(0.0), hit);
             record(path, index, primitive, t.y, outwards, vec2(0.0), hit);

@@ -9,7 +9,7 @@ vec3 from_polar(float z, float sin_theta, float u) {
 
 // Uniform over the sphere of directions.
 vec3 square_to_sphere(vec2 u) {
-    float z = 1.0 - 2.0 * u.x;
+    float z = 2.0 * u.x - 1.0;
     return from_polar(z, 2.0 * sqrt(u.x * (1.0 - u.x)), u.y);
 }
 

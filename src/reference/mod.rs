@@ -1,1 +1,163 @@
-//! reference
+//! The renderer on the CPU, in double precision, for trust: one file for each file of `shaders/lib`, with the same names, the
+//! same random numbers and the same decisions. It follows the very paths of the kernels, so the two differ by rounding
+//! alone, but for the few paths where rounding turns a decision.
+//!
+//! It shares no code with [`crate::gpu`]; both read the tables of [`crate::pack`].
+
+pub mod bindings;
+pub mod bsdf;
+pub mod bvh;
+pub mod camera;
+pub mod film;
+pub mod light;
+pub mod math;
+pub mod medium;
+pub mod path;
+pub mod phase;
+pub mod ray;
+pub mod rng;
+pub mod sampler;
+pub mod warp;
+
+use crate::pack::Packed;
+use crate::pack::layout::TILE;
+use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo};
+use bindings::Tables;
+use bvh::{grid_ray, next_primitive, start_walk, step_walk};
+use film::tile_pixel;
+use glam::DVec3;
+use path::{Path, begin_hit, path_advance, path_light, path_start, test_primitive};
+use ray::Ray;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A scene on the CPU.
+pub struct Renderer {
+    tables: Tables,
+    info: DeviceInfo,
+}
+
+impl Renderer {
+    /// Widens the tables.
+    pub fn new(packed: Packed) -> Renderer {
+        let driver = format!("tyndall {}", env!("CARGO_PKG_VERSION"));
+        Renderer {
+            tables: Tables::new(&packed),
+            info: DeviceInfo { name: "CPU reference (f64)".to_owned(), driver },
+        }
+    }
+
+    fn render_block(&self, samples: Range<u32>) -> Block {
+        let [width, height] = [self.tables.params.crop_width, self.tables.params.crop_height];
+        let mut block = Block {
+            first: samples.start,
+            count: samples.end - samples.start,
+            sums: vec![[0.0; 3]; (width * height) as usize],
+            squares: vec![[0.0; 3]; (width * height) as usize],
+            invalid: [0; 3],
+        };
+        let tiles = width.div_ceil(TILE) * height.div_ceil(TILE);
+        // In parallel by pixel, in the order of tiles; each pixel's samples in order, so the sums are always the same.
+        let pixels: Vec<(usize, PixelSums)> = (0..tiles * TILE * TILE)
+            .into_par_iter()
+            .filter_map(|slot| {
+                let [x, y] = tile_pixel(slot / (TILE * TILE), slot % (TILE * TILE), width);
+                let inside = x < width && y < height;
+                inside.then(|| ((y * width + x) as usize, self.pixel_sums(x, y, samples.clone())))
+            })
+            .collect();
+        for (index, pixel) in pixels {
+            block.sums[index] = pixel.sum.as_vec3().to_array();
+            block.squares[index] = pixel.squares.as_vec3().to_array();
+            for (total, count) in block.invalid.iter_mut().zip(pixel.invalid) {
+                *total += count;
+            }
+        }
+        block
+    }
+
+    /// Mirror of `resolve.comp`.
+    fn pixel_sums(&self, x: u32, y: u32, samples: Range<u32>) -> PixelSums {
+        let params = &self.tables.params;
+        let pixel = (y + params.crop_y) * params.film_width + x + params.crop_x;
+        let mut sums = PixelSums::default();
+        for sample_index in samples {
+            let value = trace(&self.tables, pixel, sample_index);
+            sums.sum += value;
+            sums.squares += value * value;
+            if let Some(cause) = invalid_cause(value) {
+                sums.invalid[cause] += 1;
+            }
+        }
+        sums
+    }
+}
+
+impl Backend for Renderer {
+    fn device(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn render(&mut self, samples: Range<u32>) -> Result<Vec<Block>, BackendError> {
+        assert!(samples.start.is_multiple_of(BLOCK_SAMPLES), "blocks are aligned");
+        let starts = samples.clone().step_by(BLOCK_SAMPLES as usize);
+        Ok(starts.map(|first| self.render_block(first..samples.end.min(first.saturating_add(BLOCK_SAMPLES)))).collect())
+    }
+}
+
+/// What a block has of one pixel.
+#[derive(Default)]
+struct PixelSums {
+    sum: DVec3,
+    squares: DVec3,
+    invalid: [u64; 3],
+}
+
+/// Index in [`crate::render::INVALID_CAUSES`] of what is wrong with a sample.
+fn invalid_cause(value: DVec3) -> Option<usize> {
+    if value.is_nan() {
+        Some(0)
+    } else if !value.is_finite() {
+        Some(1)
+    } else if value.min_element() < 0.0 {
+        Some(2)
+    } else {
+        None
+    }
+}
+
+/// The radiance of one sample of a pixel of the film, which is counted row by row over the whole film.
+pub fn sample_radiance(packed: &Packed, pixel: u32, sample_index: u32) -> DVec3 {
+    trace(&Tables::new(packed), pixel, sample_index)
+}
+
+/// Mirror of the loop of `path_trace.comp` for one sample.
+pub fn trace(tables: &Tables, pixel: u32, sample_index: u32) -> DVec3 {
+    let mut path = path_start(tables, pixel, sample_index);
+    while path.alive || path.shadow {
+        let hit = traverse(tables, &path);
+        if path.shadow {
+            path_light(tables, &mut path, &hit);
+        } else {
+            path_advance(tables, &mut path, &hit);
+        }
+    }
+    path.radiance
+}
+
+/// Answers the ray that a path asks for.
+pub fn traverse(tables: &Tables, path: &Path) -> path::Hit {
+    let (params, copies) = (&tables.params, tables.features.node_copies);
+    let mut hit = begin_hit(tables, path);
+    let ray = Ray::new(path.origin, path.direction);
+    let grid = grid_ray(path.origin, path.direction, params.grid_origin, params.grid_step);
+    let mut walk = start_walk(&grid, params.node_count, copies);
+    while !walk.is_done() && !hit.blocked {
+        if walk.leaf != 0 {
+            test_primitive(tables, path, &ray, next_primitive(&mut walk), &mut hit);
+        } else {
+            step_walk(tables.nodes[walk.node as usize], &grid, hit.t, copies, &mut walk);
+        }
+    }
+    hit
+}

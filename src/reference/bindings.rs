@@ -1,0 +1,197 @@
+//! Mirror of `shaders/lib/bindings.glsl`: the tables of the scene, their numbers widened to double precision.
+
+use crate::pack::features::Features;
+use crate::pack::{Packed, layout};
+use glam::DVec3;
+
+/// What the kernel reads.
+#[derive(Clone, Debug)]
+pub struct Tables {
+    /// Of the hierarchy.
+    pub nodes: Vec<[u32; 4]>,
+    /// In the order of the hierarchy's leaves.
+    pub primitives: Vec<Primitive>,
+    /// One for each shape.
+    pub surfaces: Vec<Surface>,
+    /// Entry 0 is vacuum.
+    pub media: Vec<Medium>,
+    /// Lights that can be sampled.
+    pub lights: Vec<Light>,
+    /// What holds for the whole render.
+    pub params: Params,
+    /// Of these, the ones that decide what is rendered; the others only leave out what a scene does not need.
+    pub features: Features,
+}
+
+/// See [`layout::Primitive`].
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs, reason = "the members are documented in `layout`")]
+pub struct Primitive {
+    pub a: DVec3,
+    pub surface: u32,
+    pub b: DVec3,
+    pub light: u32,
+    pub c: DVec3,
+}
+
+/// See [`layout::Surface`].
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs, reason = "the members are documented in `layout`")]
+pub struct Surface {
+    pub reflectance: DVec3,
+    pub flags: u32,
+    pub sigma_t_step: DVec3,
+    pub media: u32,
+}
+
+/// See [`layout::Medium`].
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs, reason = "the members are documented in `layout`")]
+pub struct Medium {
+    pub sigma_t: DVec3,
+    pub g: f64,
+    pub albedo: DVec3,
+}
+
+/// See [`layout::Light`].
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs, reason = "the members are documented in `layout`")]
+pub struct Light {
+    pub origin: DVec3,
+    pub kind: u32,
+    pub edge_1: DVec3,
+    pub probability: f64,
+    pub edge_2: DVec3,
+    pub area: f64,
+    pub radiance: DVec3,
+    pub alias_threshold: f64,
+    pub normal: DVec3,
+    pub alias: u32,
+}
+
+/// See [`layout::Params`].
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs, reason = "the members are documented in `layout`")]
+pub struct Params {
+    pub camera_origin: DVec3,
+    pub camera_medium: u32,
+    pub camera_corner: DVec3,
+    pub near_clip: f64,
+    pub camera_right: DVec3,
+    pub far_clip: f64,
+    pub camera_down: DVec3,
+    pub seed: u32,
+    pub grid_origin: DVec3,
+    pub node_count: u32,
+    pub grid_step: DVec3,
+    pub inverse_width: f64,
+    pub inverse_height: f64,
+    pub crop_x: u32,
+    pub crop_y: u32,
+    pub crop_width: u32,
+    pub crop_height: u32,
+    pub sample_mask: u32,
+    pub sample_bits: u32,
+    pub world_sigma_t: DVec3,
+    pub film_width: u32,
+}
+
+impl Tables {
+    /// Widens the tables.
+    pub fn new(packed: &Packed) -> Tables {
+        Tables {
+            nodes: packed.bvh.nodes.clone(),
+            primitives: packed.primitives.iter().map(Primitive::from).collect(),
+            surfaces: packed.surfaces.iter().map(Surface::from).collect(),
+            media: packed.media.iter().map(Medium::from).collect(),
+            lights: packed.lights.iter().map(Light::from).collect(),
+            params: Params::from(&packed.params),
+            features: packed.features,
+        }
+    }
+
+    /// A primitive by its index.
+    pub fn primitive(&self, index: u32) -> &Primitive {
+        &self.primitives[index as usize]
+    }
+
+    /// The surface of a primitive.
+    pub fn surface_of(&self, primitive: &Primitive) -> &Surface {
+        let flags = layout::PRIMITIVE_BOUNDARY | layout::PRIMITIVE_SPHERE;
+        &self.surfaces[(primitive.surface & !flags) as usize]
+    }
+}
+
+impl From<&layout::Primitive> for Primitive {
+    fn from(from: &layout::Primitive) -> Primitive {
+        Primitive {
+            a: from.a.as_dvec3(),
+            surface: from.surface,
+            b: from.b.as_dvec3(),
+            light: from.light,
+            c: from.c.as_dvec3(),
+        }
+    }
+}
+
+impl From<&layout::Surface> for Surface {
+    fn from(from: &layout::Surface) -> Surface {
+        Surface {
+            reflectance: from.reflectance.as_dvec3(),
+            flags: from.flags,
+            sigma_t_step: from.sigma_t_step.as_dvec3(),
+            media: from.media,
+        }
+    }
+}
+
+impl From<&layout::Medium> for Medium {
+    fn from(from: &layout::Medium) -> Medium {
+        Medium { sigma_t: from.sigma_t.as_dvec3(), g: f64::from(from.g), albedo: from.albedo.as_dvec3() }
+    }
+}
+
+impl From<&layout::Light> for Light {
+    fn from(from: &layout::Light) -> Light {
+        Light {
+            origin: from.origin.as_dvec3(),
+            kind: from.kind,
+            edge_1: from.edge_1.as_dvec3(),
+            probability: f64::from(from.probability),
+            edge_2: from.edge_2.as_dvec3(),
+            area: f64::from(from.area),
+            radiance: from.radiance.as_dvec3(),
+            alias_threshold: f64::from(from.alias_threshold),
+            normal: from.normal.as_dvec3(),
+            alias: from.alias,
+        }
+    }
+}
+
+impl From<&layout::Params> for Params {
+    fn from(from: &layout::Params) -> Params {
+        Params {
+            camera_origin: from.camera_origin.as_dvec3(),
+            camera_medium: from.camera_medium,
+            camera_corner: from.camera_corner.as_dvec3(),
+            near_clip: f64::from(from.near_clip),
+            camera_right: from.camera_right.as_dvec3(),
+            far_clip: f64::from(from.far_clip),
+            camera_down: from.camera_down.as_dvec3(),
+            seed: from.seed,
+            grid_origin: from.grid_origin.as_dvec3(),
+            node_count: from.node_count,
+            grid_step: from.grid_step.as_dvec3(),
+            inverse_width: f64::from(from.inverse_width),
+            inverse_height: f64::from(from.inverse_height),
+            crop_x: from.crop_x,
+            crop_y: from.crop_y,
+            crop_width: from.crop_width,
+            crop_height: from.crop_height,
+            sample_mask: from.sample_mask,
+            sample_bits: from.sample_bits,
+            world_sigma_t: from.world_sigma_t.as_dvec3(),
+            film_width: from.film_width,
+        }
+    }
+}

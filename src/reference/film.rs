@@ -1,0 +1,9 @@
+//! Mirror of `shaders/lib/film.glsl`: which pixel is worked on.
+
+use crate::pack::layout::TILE;
+
+/// Column and row, within the crop window, of a pixel of a tile. Tiles and the pixels in them go row by row.
+pub fn tile_pixel(tile: u32, pixel: u32, crop_width: u32) -> [u32; 2] {
+    let tiles_across = crop_width.div_ceil(TILE);
+    [tile % tiles_across * TILE + pixel % TILE, tile / tiles_across * TILE + pixel / TILE]
+}

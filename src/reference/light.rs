@@ -1,0 +1,121 @@
+//! Mirror of `shaders/lib/light.glsl`: what lights send to a point, and the density with which they are sampled.
+
+use super::bindings::Light;
+use super::math::from_frame;
+use super::warp::{square_to_cone, square_to_cone_pdf, square_to_sphere, square_to_sphere_pdf};
+use crate::pack::layout::LIGHT_TRIANGLE;
+use glam::{DVec2, DVec3};
+
+/// The largest number below 1 that the kernel knows.
+const BELOW_ONE: f64 = 1.0 - 1.0 / 16_777_216.0;
+
+/// A direction from a point to a light.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// Unit.
+    pub direction: DVec3,
+    /// To the sampled point.
+    pub distance: f64,
+    /// Radiance / density per solid angle; of a point: intensity / distance²; 0 if nothing arrives.
+    pub weight: DVec3,
+    /// Per solid angle, without the choice of the light; 0 for a point, which no other technique finds.
+    pub pdf: f64,
+}
+
+impl LightSample {
+    const NOTHING: LightSample = LightSample { direction: DVec3::Z, distance: 0.0, weight: DVec3::ZERO, pdf: 0.0 };
+}
+
+/// One line of the alias table (Walker 1977): `u` in \[0, 1) is split into a choice and a number that is uniform again.
+pub fn alias_line(count: u32, u: &mut f64) -> u32 {
+    let scaled = *u * f64::from(count);
+    let line = (scaled as u32).min(count - 1);
+    *u = (scaled - f64::from(line)).min(BELOW_ONE);
+    line
+}
+
+/// Whether the line itself is taken, and not its alias.
+pub fn alias_keeps(threshold: f64, u: &mut f64) -> bool {
+    let keeps = *u < threshold;
+    *u = if keeps { *u / threshold } else { (*u - threshold) / (1.0 - threshold) };
+    *u = u.min(BELOW_ONE);
+    keeps
+}
+
+/// Density per solid angle of a uniform point on a plane figure, seen at a distance under the cosine at the figure.
+pub fn area_pdf(area: f64, distance: f64, cos_light: f64) -> f64 {
+    distance * distance / (area * cos_light)
+}
+
+/// A point on a triangle or parallelogram.
+pub fn sample_plane_light(light: &Light, point: DVec3, u: DVec2) -> LightSample {
+    let mut v = u;
+    if light.kind == LIGHT_TRIANGLE {
+        let s = u.x.sqrt();
+        v = DVec2::new(1.0 - s, u.y * s);
+    }
+    let offset = light.origin + light.edge_1 * v.x + light.edge_2 * v.y - point;
+    let squared = offset.dot(offset);
+    let distance = squared.sqrt();
+    let direction = offset / distance;
+    let cos_light = -direction.dot(light.normal);
+    let seen = cos_light > 0.0 && squared > 0.0;
+    LightSample {
+        direction,
+        distance,
+        pdf: if seen { squared / (light.area * cos_light) } else { 0.0 },
+        weight: if seen { light.radiance * (light.area * cos_light / squared) } else { DVec3::ZERO },
+    }
+}
+
+/// 1 − cos of half the angle under which a sphere is seen from outside.
+pub fn sphere_one_minus_cos(radius: f64, center_distance: f64) -> f64 {
+    let sin_squared = (radius * radius / (center_distance * center_distance)).min(1.0);
+    sin_squared / (1.0 + (1.0 - sin_squared).sqrt())
+}
+
+/// The outside of a sphere from outside, uniformly over its cone; the inside of a sphere with normals inwards from inside,
+/// uniformly over all directions.
+pub fn sample_sphere_light(light: &Light, point: DVec3, u: DVec2) -> LightSample {
+    let to_center = light.origin - point;
+    let radius = light.edge_1.x;
+    let center_distance = to_center.length();
+    let inwards = light.edge_1.y < 0.0;
+    let inside = center_distance < radius;
+    if inside != inwards {
+        return LightSample::NOTHING;
+    }
+    let (direction, pdf) = if inside {
+        (square_to_sphere(u), square_to_sphere_pdf())
+    } else {
+        let one_minus_cos = sphere_one_minus_cos(radius, center_distance);
+        let local = square_to_cone(u, one_minus_cos);
+        (from_frame(to_center / center_distance, local), square_to_cone_pdf(one_minus_cos))
+    };
+    let along = to_center.dot(direction);
+    let closest = to_center - along * direction;
+    let half_chord = (radius * radius - closest.dot(closest)).max(0.0).sqrt();
+    let distance = if inside { along + half_chord } else { along - half_chord };
+    LightSample { direction, distance, weight: light.radiance / pdf, pdf }
+}
+
+/// Density per solid angle with which a sphere is sampled.
+pub fn sphere_light_pdf(radius: f64, center_distance: f64) -> f64 {
+    if center_distance < radius {
+        square_to_sphere_pdf()
+    } else {
+        square_to_cone_pdf(sphere_one_minus_cos(radius, center_distance))
+    }
+}
+
+/// The one direction to a point.
+pub fn sample_point_light(light: &Light, point: DVec3) -> LightSample {
+    let offset = light.origin - point;
+    let squared = offset.dot(offset);
+    let distance = squared.sqrt();
+    if squared > 0.0 {
+        LightSample { direction: offset / distance, distance, weight: light.radiance / squared, pdf: 0.0 }
+    } else {
+        LightSample::NOTHING
+    }
+}

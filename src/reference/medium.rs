@@ -1,0 +1,49 @@
+//! Mirror of `shaders/lib/medium.glsl`: optical depths and what a path weighs after a free flight.
+
+use super::math::{exp_minus_rgb, sum_components};
+use crate::pack::layout::INFINITE_DISTANCE;
+use glam::DVec3;
+
+/// Probabilities to choose each channel: proportional to the throughput.
+pub fn channel_weights(throughput: DVec3) -> DVec3 {
+    throughput / sum_components(throughput)
+}
+
+/// The channel in which u in \[0, 1) falls.
+pub fn sample_channel(weights: DVec3, u: f64) -> u32 {
+    if u < weights.x {
+        0
+    } else if u < weights.x + weights.y {
+        1
+    } else {
+        2
+    }
+}
+
+/// Distance at which the optical depth reaches tau; never, in vacuum.
+pub fn free_flight(tau: f64, sigma_t: f64) -> f64 {
+    let infinite = f64::from(INFINITE_DISTANCE);
+    if sigma_t > 0.0 { (tau / sigma_t).min(infinite) } else { infinite }
+}
+
+/// Probability that a flight gets as far as tau.
+pub fn survival_probability(weights: DVec3, tau: DVec3) -> f64 {
+    weights.dot(exp_minus_rgb(tau))
+}
+
+/// Weight of a path that got as far as tau.
+pub fn survival_weight(weights: DVec3, tau: DVec3) -> DVec3 {
+    let transmittance = exp_minus_rgb(tau);
+    transmittance / weights.dot(transmittance)
+}
+
+/// Weight of a path that scatters at tau.
+pub fn scatter_weight(weights: DVec3, tau: DVec3, sigma_t: DVec3, albedo: DVec3) -> DVec3 {
+    let collision = sigma_t * exp_minus_rgb(tau);
+    albedo * collision / weights.dot(collision)
+}
+
+/// The medium behind a boundary that is crossed from `from` to `to`.
+pub fn cross_boundary(medium: u32, from: u32, to: u32) -> u32 {
+    if medium == from || medium == to { to } else { medium.wrapping_add(to).wrapping_sub(from) }
+}

@@ -1,0 +1,444 @@
+//! Mirror of `shaders/lib/path.glsl`: the estimator, a path as a coroutine that asks for one ray at a time. A path's life is
+//! described there. What the kernel leaves out where a scene does not need it is always here.
+
+use super::bindings::{Light, Medium, Primitive, Tables};
+use super::bsdf::eval_diffuse;
+use super::camera::camera_direction;
+use super::light::{
+    LightSample, alias_keeps, alias_line, area_pdf, sample_plane_light, sample_point_light, sample_sphere_light,
+    sphere_light_pdf,
+};
+use super::math::{exp_minus_rgb, from_frame, max_component, minus_log_1m};
+use super::medium::{
+    channel_weights, cross_boundary, free_flight, sample_channel, scatter_weight, survival_probability, survival_weight,
+};
+use super::phase::{eval_henyey_greenstein, sample_henyey_greenstein};
+use super::ray::{Ray, TriangleHit, intersect_sphere, intersect_triangle, offset_distance};
+use super::sampler::sample_set;
+use super::warp::{from_polar, square_to_cosine_hemisphere};
+use crate::pack::layout;
+use crate::pack::layout::{
+    LIGHT_CONSTANT, LIGHT_POINT, LIGHT_SPHERE, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_TWO_SIDED,
+};
+use glam::{DVec2, DVec3, DVec4, Vec4Swizzles};
+
+/// Nothing, among indices.
+pub const NONE: u32 = u32::MAX;
+/// Longest distance; rays that end nowhere end here.
+const INFINITE_DISTANCE: f64 = layout::INFINITE_DISTANCE as f64;
+/// Depth at which roulette begins to end paths that lose nothing.
+const RELENTLESS_DEPTH: u32 = 256;
+
+/// A path between two rays.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Path {
+    /// Of the whole film.
+    pub pixel: u32,
+    /// Of the pixel.
+    pub sample_index: u32,
+    /// Of the ray that is asked for.
+    pub origin: DVec3,
+    /// Of the ray that is asked for; unit.
+    pub direction: DVec3,
+    /// Where the ray begins, or the last boundary on it.
+    pub t_min: f64,
+    /// The free flight, or the distance to the light.
+    pub t_max: f64,
+    /// The boundary at `t_min`, or [`NONE`].
+    pub last: u32,
+    /// A shadow ray is asked for.
+    pub shadow: bool,
+    /// What the radiance at the path's end is multiplied with.
+    pub throughput: DVec3,
+    /// What the path has gathered.
+    pub radiance: DVec3,
+    /// Counts the random numbers' sets.
+    pub segment: u32,
+    /// Scattering events so far.
+    pub depth: u32,
+    /// Density per solid angle of `direction`; 0 for a camera ray.
+    pub pdf: f64,
+    /// The path goes on behind the ray that is asked for.
+    pub alive: bool,
+    /// Where the path is.
+    pub medium: u32,
+    /// Optical depth, in the chosen channel, from `t_min` to the end of the flight.
+    pub tau_left: f64,
+    /// Optical depth from the last event to `t_min`.
+    pub tau_rgb: DVec3,
+    /// The flight's.
+    pub channel: u32,
+    /// Where the far clip plane ends a camera ray.
+    pub far_end: f64,
+    /// Where the path goes on behind a shadow ray.
+    pub next_direction: DVec3,
+    /// What arrives if nothing is in the way.
+    pub light_weight: DVec3,
+    /// Density of the light's direction by scattering over that by light sampling; 0 for a point.
+    pub pdf_ratio: f64,
+    /// The light that the shadow ray goes to.
+    pub light: u32,
+}
+
+/// What the traversal found.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Distance.
+    pub t: f64,
+    /// [`NONE`]: nothing within `t_max`.
+    pub primitive: u32,
+    /// The ray goes along the normal.
+    pub along_normal: bool,
+    /// Of a triangle.
+    pub barycentric: DVec2,
+    /// Shadow rays: optical depth.
+    pub tau_rgb: DVec3,
+    /// Shadow rays: something is in the way.
+    pub blocked: bool,
+}
+
+fn medium_of<'a>(tables: &'a Tables, path: &Path) -> &'a Medium {
+    // An index that boundaries without a consistent nesting made up is vacuum.
+    tables.media.get(path.medium as usize).unwrap_or(&tables.media[0])
+}
+
+/// Distance to the end of the flight with the extinction that holds from `t_min` on.
+fn flight_end(tables: &Tables, path: &Path) -> f64 {
+    let sigma = medium_of(tables, path).sigma_t[path.channel as usize];
+    (path.t_min + free_flight(path.tau_left, sigma)).min(path.far_end)
+}
+
+/// A new segment along `path.direction`: its flight from two random numbers.
+fn begin_segment(tables: &Tables, path: &mut Path, u: DVec2) {
+    path.last = NONE;
+    path.shadow = false;
+    path.tau_left = minus_log_1m(u.x);
+    path.tau_rgb = DVec3::ZERO;
+    path.channel = sample_channel(channel_weights(path.throughput), u.y);
+    path.t_max = flight_end(tables, path);
+}
+
+fn random_set(tables: &Tables, path: &Path, set: u32) -> DVec4 {
+    let params = &tables.params;
+    sample_set(params.seed, path.pixel, set, path.sample_index, params.sample_bits, params.sample_mask)
+}
+
+/// A ray from the camera, and a free flight for its first segment.
+pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
+    let mut path = Path { pixel, sample_index, ..Path::default() };
+    let params = &tables.params;
+    let u = random_set(tables, &path, 0);
+    let (row, column) = (pixel / params.film_width, pixel % params.film_width);
+    let film = (DVec2::new(f64::from(column), f64::from(row)) + u.xy())
+        * DVec2::new(params.inverse_width, params.inverse_height);
+    let direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
+    let depth_to_distance = direction.length();
+    path.origin = params.camera_origin;
+    path.direction = direction / depth_to_distance;
+    path.t_min = params.near_clip * depth_to_distance;
+    path.far_end = params.far_clip * depth_to_distance;
+    path.throughput = DVec3::ONE;
+    path.radiance = DVec3::ZERO;
+    path.alive = true;
+    path.medium = params.camera_medium;
+    begin_segment(tables, &mut path, u.zw());
+    path
+}
+
+/// Weight of a direction found by scattering that light sampling finds with density `light_pdf`: the balance heuristic (Veach
+/// and Guibas 1995).
+fn scattering_mis_weight(path: &Path, survival: f64, light_pdf: f64) -> f64 {
+    let found = path.pdf * survival;
+    if path.pdf == 0.0 || light_pdf == 0.0 { 1.0 } else { found / (found + light_pdf) }
+}
+
+/// Probability that the flight got as far as it did.
+fn survival(path: &Path) -> f64 {
+    survival_probability(channel_weights(path.throughput), path.tau_rgb)
+}
+
+fn survived_throughput(path: &Path) -> DVec3 {
+    path.throughput * survival_weight(channel_weights(path.throughput), path.tau_rgb)
+}
+
+fn emitters_seen(tables: &Tables, path: &Path) -> bool {
+    !(tables.features.hide_emitters && path.depth == 0)
+}
+
+/// Adds the constant light to a path that leaves the scene.
+fn add_constant_light(tables: &Tables, path: &mut Path) {
+    if !emitters_seen(tables, path) {
+        return;
+    }
+    for light in tables.lights.iter().filter(|light| light.kind == LIGHT_CONSTANT) {
+        // Light sampling takes its directions from the same scattering function (see `sample_light`).
+        let light_pdf = if tables.features.light_sampling { light.probability * path.pdf } else { 0.0 };
+        let weight = scattering_mis_weight(path, survival(path), light_pdf);
+        path.radiance += survived_throughput(path) * light.radiance * weight;
+    }
+}
+
+/// Adds what a primitive emits towards the path.
+fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: f64, normal: DVec3) {
+    let cos_light = -path.direction.dot(normal);
+    if primitive.light == 0 || cos_light <= 0.0 || !emitters_seen(tables, path) {
+        return;
+    }
+    let light: &Light = &tables.lights[primitive.light as usize - 1];
+    let pdf = if light.kind == LIGHT_SPHERE {
+        sphere_light_pdf(light.edge_1.x, path.origin.distance(light.origin))
+    } else {
+        area_pdf(light.area, t, cos_light)
+    };
+    let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
+    let weight = scattering_mis_weight(path, survival(path), light_pdf);
+    path.radiance += survived_throughput(path) * light.radiance * weight;
+}
+
+/// A point where light is scattered, in a medium or on a surface.
+#[derive(Clone, Copy, Debug)]
+struct Vertex {
+    point: DVec3,
+    /// Normal on the side of the incident ray; in a medium, the direction of propagation.
+    axis: DVec3,
+    in_medium: bool,
+    g: f64,
+}
+
+/// Scattering function times cosine over the albedo or reflectance: also the density with which directions are sampled.
+fn eval_scattering(vertex: &Vertex, direction: DVec3) -> f64 {
+    if vertex.in_medium {
+        return eval_henyey_greenstein(vertex.g, vertex.axis, direction);
+    }
+    eval_diffuse(vertex.axis.dot(direction))
+}
+
+fn sample_scattering(vertex: &Vertex, u: DVec2) -> DVec3 {
+    if vertex.in_medium {
+        let angle = sample_henyey_greenstein(vertex.g, u.x);
+        let local = from_polar(angle.cos_theta, angle.sin_theta, u.y);
+        // For g = 0 no axis matters; the kernel leaves the frame out where it knows no other g.
+        return if vertex.g == 0.0 { local } else { from_frame(vertex.axis, local) };
+    }
+    from_frame(vertex.axis, square_to_cosine_hemisphere(u))
+}
+
+/// Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.
+fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2) -> bool {
+    if !tables.features.light_sampling {
+        return false;
+    }
+    let mut index = alias_line(tables.lights.len() as u32, &mut u.x);
+    let line = &tables.lights[index as usize];
+    index = if alias_keeps(line.alias_threshold, &mut u.x) { index } else { line.alias };
+    let light = &tables.lights[index as usize];
+    let found = match light.kind {
+        LIGHT_CONSTANT => {
+            // No direction is better than another, so the scattering function samples them; what light sampling adds is
+            // the transmittance, exact instead of 0 or 1.
+            let direction = sample_scattering(vertex, u);
+            let pdf = eval_scattering(vertex, direction);
+            let weight = if pdf > 0.0 { light.radiance / pdf } else { DVec3::ZERO };
+            LightSample { direction, distance: INFINITE_DISTANCE, weight, pdf }
+        }
+        LIGHT_POINT => sample_point_light(light, vertex.point),
+        LIGHT_SPHERE => sample_sphere_light(light, vertex.point, u),
+        _ => sample_plane_light(light, vertex.point, u),
+    };
+    let scattering = eval_scattering(vertex, found.direction);
+    path.direction = found.direction;
+    path.t_max = found.distance;
+    path.light = index;
+    path.light_weight = path.throughput * found.weight * (scattering / light.probability);
+    path.pdf_ratio = if found.pdf > 0.0 { scattering / (found.pdf * light.probability) } else { 0.0 };
+    max_component(path.light_weight) > 0.0
+}
+
+/// Scatters at a vertex: the shadow ray, the next direction, roulette.
+fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex, albedo: DVec3) {
+    path.depth += 1;
+    path.throughput *= albedo;
+    path.alive = max_component(path.throughput) > 0.0 && path.depth < tables.features.max_depth;
+    path.shadow = false;
+    if !path.alive {
+        return;
+    }
+    let u = random_set(tables, path, 2 * path.segment + 1);
+    path.next_direction = sample_scattering(vertex, u.zw());
+    path.pdf = eval_scattering(vertex, path.next_direction);
+    path.alive = path.pdf > 0.0;
+    path.origin = vertex.point;
+    path.t_min = 0.0;
+    path.last = NONE;
+    path.far_end = INFINITE_DISTANCE;
+    path.shadow = sample_light(tables, path, vertex, u.xy());
+}
+
+/// Begins the segment after a vertex, unless roulette ends the path.
+fn next_segment(tables: &Tables, path: &mut Path) {
+    path.segment += 1;
+    let u = random_set(tables, path, 2 * path.segment);
+    if path.depth >= tables.features.rr_depth {
+        let most = if path.depth < RELENTLESS_DEPTH { 1.0 } else { 0.95 };
+        let keep = (3.0 * max_component(path.throughput)).min(most);
+        path.alive = path.alive && u.x < keep;
+        path.throughput /= keep;
+    }
+    path.direction = path.next_direction;
+    path.t_min = 0.0;
+    begin_segment(tables, path, u.zw());
+}
+
+/// A point on a primitive, its unit normal, and the largest coordinate that went into it.
+fn surface_point(primitive: &Primitive, path: &Path, hit: &Hit) -> (DVec3, DVec3, f64) {
+    let Primitive { a, b, c, .. } = *primitive;
+    if primitive.surface & PRIMITIVE_SPHERE != 0 {
+        let outwards = (path.origin + path.direction * hit.t - a).normalize();
+        return (a + outwards * b.x, outwards * b.y, max_component(a.abs()) + b.x);
+    }
+    let (edge_1, edge_2) = (b - a, c - a);
+    let point = a + edge_1 * hit.barycentric.x + edge_2 * hit.barycentric.y;
+    (point, edge_1.cross(edge_2).normalize(), max_component(a.abs().max(b.abs().max(c.abs()))))
+}
+
+/// Answers a ray that extends the path.
+pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
+    let surface_hit = hit.primitive != NONE;
+    let t = if surface_hit { hit.t } else { path.t_max };
+
+    // The optical depth of the way through the medium since `t_min`.
+    let medium = *medium_of(tables, path);
+    let way = t - path.t_min;
+    path.tau_left -= way * medium.sigma_t[path.channel as usize];
+    path.tau_rgb += medium.sigma_t * way;
+    if !surface_hit && t >= path.far_end {
+        add_constant_light(tables, path);
+        path.alive = false;
+        path.shadow = false;
+        return;
+    }
+    if !surface_hit {
+        let weight = scatter_weight(channel_weights(path.throughput), path.tau_rgb, medium.sigma_t, medium.albedo);
+        let point = path.origin + path.direction * t;
+        scatter(tables, path, &Vertex { point, axis: path.direction, in_medium: true, g: medium.g }, weight);
+    } else {
+        let primitive = tables.primitive(hit.primitive);
+        let surface = tables.surface_of(primitive);
+        if primitive.surface & PRIMITIVE_BOUNDARY != 0 {
+            let (inside, outside) = (surface.media & 0xffff, surface.media >> 16);
+            let (from, to) = if hit.along_normal { (inside, outside) } else { (outside, inside) };
+            path.medium = cross_boundary(path.medium, from, to);
+            path.t_min = t;
+            path.last = hit.primitive;
+            path.tau_left = path.tau_left.max(0.0);
+            path.t_max = flight_end(tables, path);
+            return;
+        }
+        let (point, normal, largest) = surface_point(primitive, path, hit);
+        add_emission(tables, path, primitive, t, normal);
+        path.throughput = survived_throughput(path);
+        let back = path.direction.dot(normal) > 0.0;
+        let black = back && surface.flags & SURFACE_TWO_SIDED == 0;
+        let axis = if back { -normal } else { normal };
+        let vertex = Vertex { point: point + axis * offset_distance(largest), axis, in_medium: false, g: 0.0 };
+        scatter(tables, path, &vertex, if black { DVec3::ZERO } else { surface.reflectance });
+    }
+    if !path.shadow && path.alive {
+        next_segment(tables, path);
+    }
+}
+
+/// Answers a shadow ray.
+pub fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
+    if !hit.blocked {
+        let transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
+        let survives = channel_weights(path.throughput).dot(transmittance);
+        path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
+    }
+    path.shadow = false;
+    if path.alive {
+        next_segment(tables, path);
+    }
+}
+
+/// The length L of a shadow ray in its optical depth σ₀ L + Σ (σ after − σ before) (L − t). Where an infinite ray ends in
+/// vacuum, σ₀ and the steps add up to 0 and any L serves.
+fn shadow_length(path: &Path) -> f64 {
+    if path.t_max >= INFINITE_DISTANCE { 0.0 } else { path.t_max }
+}
+
+/// An infinite ray that ends in a medium brings no light.
+fn depth_at_infinity(tables: &Tables, path: &Path) -> DVec3 {
+    if path.t_max < INFINITE_DISTANCE {
+        return DVec3::ZERO;
+    }
+    DVec3::select(tables.params.world_sigma_t.cmpgt(DVec3::ZERO), DVec3::splat(INFINITE_DISTANCE), DVec3::ZERO)
+}
+
+/// The state of a traversal before its first step.
+pub fn begin_hit(tables: &Tables, path: &Path) -> Hit {
+    let mut hit = Hit {
+        t: path.t_max,
+        primitive: NONE,
+        along_normal: false,
+        barycentric: DVec2::ZERO,
+        tau_rgb: DVec3::ZERO,
+        blocked: false,
+    };
+    if path.shadow {
+        hit.tau_rgb = medium_of(tables, path).sigma_t * shadow_length(path) + depth_at_infinity(tables, path);
+    }
+    hit
+}
+
+/// One crossing of a ray with a primitive.
+struct Crossing {
+    t: f64,
+    along_normal: bool,
+    barycentric: DVec2,
+}
+
+/// Takes one crossing with a primitive into account.
+fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit: &mut Hit) {
+    let primitive = tables.primitive(index);
+    let Crossing { t, along_normal, barycentric } = crossing;
+    // Distances first, the primitive's index among equals: surfaces that coincide are met one after the other, none twice.
+    let begins = t > path.t_min || (t == path.t_min && index > path.last && path.last != NONE);
+    if path.shadow {
+        let boundary = primitive.surface & PRIMITIVE_BOUNDARY != 0;
+        let counts = begins && t < path.t_max;
+        if counts && boundary {
+            let way = (shadow_length(path) - t) * if along_normal { -1.0 } else { 1.0 };
+            hit.tau_rgb += tables.surface_of(primitive).sigma_t_step * way;
+        }
+        // The light itself is not in the way of its light.
+        hit.blocked |= counts && !boundary && primitive.light != path.light + 1;
+    } else if begins && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE)) {
+        hit.t = t;
+        hit.primitive = index;
+        hit.along_normal = along_normal;
+        hit.barycentric = barycentric;
+    }
+}
+
+/// Tests one primitive.
+pub fn test_primitive(tables: &Tables, path: &Path, ray: &Ray, index: u32, hit: &mut Hit) {
+    let primitive = tables.primitive(index);
+    if primitive.surface & PRIMITIVE_SPHERE != 0 {
+        let t = intersect_sphere(ray, primitive.a, primitive.b.x);
+        // A ray that touches the sphere in one point does not cross it.
+        if t.x < t.y {
+            let outwards = primitive.b.y > 0.0;
+            let near = Crossing { t: t.x, along_normal: !outwards, barycentric: DVec2::ZERO };
+            let far = Crossing { t: t.y, along_normal: outwards, barycentric: DVec2::ZERO };
+            record(tables, path, index, near, hit);
+            record(tables, path, index, far, hit);
+        }
+    } else {
+        let found = intersect_triangle(ray, primitive.a, primitive.b, primitive.c);
+        if found.hit {
+            let TriangleHit { t, along_normal, barycentric, .. } = found;
+            record(tables, path, index, Crossing { t, along_normal, barycentric }, hit);
+        }
+    }
+}

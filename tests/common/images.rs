@@ -1,0 +1,62 @@
+//! Images of tiny scenes, and how far two are apart.
+
+use super::device;
+use glam::DVec3;
+use tyndall::gpu;
+use tyndall::gpu::shader::Variant;
+use tyndall::pack::Packed;
+use tyndall::reference;
+use tyndall::render::{Backend, Block};
+
+/// Mean radiance of each pixel.
+pub type Image = Vec<DVec3>;
+
+/// Mean over the samples of all blocks. Samples that are not valid fail the test.
+pub fn mean(blocks: &[Block]) -> Image {
+    let samples: u32 = blocks.iter().map(|block| block.count).sum();
+    let mut image = vec![DVec3::ZERO; blocks[0].sums.len()];
+    for block in blocks {
+        assert_eq!(block.invalid, [0; 3], "samples of block {} are invalid", block.first);
+        for (pixel, sum) in image.iter_mut().zip(&block.sums) {
+            *pixel += DVec3::from_array(sum.map(f64::from)) / f64::from(samples);
+        }
+    }
+    image
+}
+
+/// As the program renders it.
+pub fn on_device(packed: &Packed, spp: u32) -> Image {
+    let mut renderer = gpu::Renderer::new(device(), packed).expect("the kernels compile");
+    mean(&renderer.render(0..spp).expect("it renders"))
+}
+
+/// With a kernel in another form.
+pub fn with_variant(packed: &Packed, spp: u32, variant: &Variant) -> Vec<Block> {
+    let mut renderer = gpu::Renderer::with_variant(device(), packed, variant).expect("the kernels compile");
+    renderer.render(0..spp).expect("it renders")
+}
+
+/// By the reference.
+pub fn by_reference(packed: &Packed, spp: u32) -> Image {
+    mean(&reference::Renderer::new(packed.clone()).render(0..spp).expect("it renders"))
+}
+
+/// Mean over all pixels.
+pub fn average(image: &Image) -> DVec3 {
+    image.iter().sum::<DVec3>() / image.len() as f64
+}
+
+/// Why two images of the same paths are not the same, if so: a share of at least 98 % of the pixels must agree to a relative
+/// 1e-3, and the means to 5e-3 (paths on which rounding turned a decision are independent samples).
+pub fn compare(one: &Image, two: &Image) -> Result<f64, String> {
+    let agrees = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().cmple(a.abs().max(b.abs()) * 1e-3 + 1e-9).all();
+    let share = one.iter().zip(two).filter(|pair| agrees(*pair)).count() as f64 / one.len() as f64;
+    if share < 0.98 {
+        return Err(format!("only {:.2} % of the pixels agree", share * 100.0));
+    }
+    let (a, b) = (average(one), average(two));
+    if (a - b).abs().cmpgt(a.max(b) * 5e-3).any() {
+        return Err(format!("the means are {a} and {b}"));
+    }
+    Ok(share)
+}

@@ -1,0 +1,21 @@
+//! What the tests share: the device, unit kernels, tiny scenes, and images.
+
+#![allow(dead_code, reason = "each test file uses a part of this")]
+
+pub mod images;
+pub mod scenes;
+pub mod statistics;
+pub mod units;
+
+use std::sync::{Arc, OnceLock};
+use tyndall::gpu::{Device, DeviceChoice};
+
+/// The device of all tests. Without one they fail.
+pub fn device() -> &'static Arc<Device> {
+    static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
+    DEVICE.get_or_init(|| {
+        let device = Device::open(&DeviceChoice::Best).expect("the tests need a Vulkan device");
+        eprintln!("device: {} ({})", device.info.name, device.info.driver);
+        device
+    })
+}

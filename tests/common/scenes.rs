@@ -1,0 +1,184 @@
+//! Tiny scenes, built in Rust.
+
+use glam::{DMat4, DVec3};
+use tyndall::pack::Packed;
+use tyndall::scene::{Bsdf, Camera, Film, Geometry, Light, Medium, Mesh, Phase, Scene, Shape};
+
+/// The tables of a scene.
+pub fn pack(scene: &Scene, seed: u32, sample_count: u32) -> Packed {
+    Packed::new(scene, seed, sample_count).expect("the scene can be packed")
+}
+
+/// A vector from its components.
+pub fn v(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+/// A parallelogram, counter-clockwise from a corner along the first edge.
+pub fn quad(corner: DVec3, edge_1: DVec3, edge_2: DVec3) -> Geometry {
+    let positions = vec![corner, corner + edge_1, corner + edge_1 + edge_2, corner + edge_2];
+    Geometry::Mesh(Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]] })
+}
+
+/// A sphere with normals outwards.
+pub fn ball(center: DVec3, radius: f64) -> Geometry {
+    Geometry::Sphere { center, radius, flipped: false }
+}
+
+/// A box with normals outwards: the image of the cube from −1 to 1.
+pub fn cuboid(to_world: DMat4) -> Geometry {
+    let positions = (0..8)
+        .map(|k| {
+            let sign = |bit: u32| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            to_world.transform_point3(v(sign(0), sign(1), sign(2)))
+        })
+        .collect();
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    Geometry::Mesh(Mesh { positions, triangles })
+}
+
+/// An icosahedron whose triangles are split `level` times, on a unit sphere.
+pub fn icosphere(level: u32) -> Mesh {
+    let phi = (1.0 + 5f64.sqrt()) / 2.0;
+    let mut positions: Vec<DVec3> = [(-1.0, phi), (1.0, phi), (-1.0, -phi), (1.0, -phi)]
+        .iter()
+        .flat_map(|&(a, b)| [v(a, b, 0.0), v(0.0, a, b), v(b, 0.0, a)])
+        .map(DVec3::normalize)
+        .collect();
+    // Faces are the triples of corners at the edge's distance from each other.
+    let near = |a: DVec3, b: DVec3| a.distance(b) < 1.06;
+    let mut triangles = Vec::new();
+    for i in 0..12 {
+        for j in i + 1..12 {
+            for k in j + 1..12 {
+                let [a, b, c] = [positions[i], positions[j], positions[k]];
+                if near(a, b) && near(b, c) && near(c, a) {
+                    let outwards = (b - a).cross(c - a).dot(a) > 0.0;
+                    triangles.push(if outwards { [i, j, k] } else { [i, k, j] }.map(|index| index as u32));
+                }
+            }
+        }
+    }
+    for _ in 0..level {
+        let mut middles = std::collections::HashMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                positions.push(((positions[a as usize] + positions[b as usize]) / 2.0).normalize());
+                positions.len() as u32 - 1
+            })
+        };
+        triangles = triangles
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            })
+            .collect();
+    }
+    Mesh { positions, triangles }
+}
+
+fn phase(g: f64) -> Phase {
+    if g == 0.0 { Phase::Isotropic } else { Phase::HenyeyGreenstein { g } }
+}
+
+/// A medium with the same coefficients in all channels.
+pub fn gray(sigma_t: f64, albedo: f64, g: f64) -> Medium {
+    Medium::new("gray", DVec3::splat(sigma_t), DVec3::splat(albedo), phase(g))
+}
+
+/// The walls of an open box from −1 to 1, seen from +z.
+fn walls(scene: &mut Scene) {
+    let (white, red, green) = (v(0.7, 0.7, 0.65), v(0.6, 0.1, 0.05), v(0.1, 0.5, 0.1));
+    let (x, y, z) = (DVec3::X * 2.0, DVec3::Y * 2.0, DVec3::Z * 2.0);
+    scene.shapes.push(Shape::diffuse("floor", quad(v(-1.0, -1.0, 1.0), x, -z), white));
+    scene.shapes.push(Shape::diffuse("ceiling", quad(v(-1.0, 1.0, -1.0), x, z), white));
+    scene.shapes.push(Shape::diffuse("back", quad(v(-1.0, -1.0, -1.0), x, y), white));
+    scene.shapes.push(Shape::diffuse("left", quad(v(-1.0, -1.0, 1.0), -z, y), red));
+    let mut right = Shape::diffuse("right", quad(v(1.0, -1.0, -1.0), z, y), green);
+    right.bsdf = Bsdf::Diffuse { reflectance: green, two_sided: false };
+    scene.shapes.push(right);
+}
+
+fn lamp() -> Shape {
+    Shape::lamp("lamp", quad(v(-0.3, 0.98, -0.3), DVec3::X * 0.6, DVec3::Z * 0.6), v(12.0, 10.0, 6.0))
+}
+
+fn camera(distance: f64) -> Camera {
+    Camera::look_at(v(0.05, 0.1, distance), DVec3::ZERO, DVec3::Y, 42.0)
+}
+
+/// A Cornell box with a ball of gray, forward-scattering medium.
+pub fn gray_box() -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    walls(&mut scene);
+    scene.shapes.push(lamp());
+    let haze = scene.add_medium(gray(4.0, 0.85, 0.6));
+    scene.shapes.push(Shape::boundary("ball", ball(v(0.1, -0.2, 0.0), 0.6), haze));
+    scene
+}
+
+/// Chromatic media in each other, a mesh in a box in a box, with the camera inside the outer one; two kinds of light.
+pub fn nested_media() -> Scene {
+    let mut scene = Scene::new(camera(2.0), Film::new(24, 24));
+    let chromatic = |name, sigma_t, albedo, g| Medium::new(name, sigma_t, albedo, phase(g));
+    let outer = scene.add_medium(chromatic("outer", v(0.2, 0.4, 0.8), v(0.9, 0.8, 0.5), -0.4));
+    let inner = scene.add_medium(chromatic("inner", v(5.0, 1.0, 0.2), v(0.95, 0.3, 0.9), 0.8));
+    let core = scene.add_medium(chromatic("core", v(0.0, 3.0, 9.0), v(0.0, 0.99, 0.6), 0.0));
+    scene.shapes.push(Shape::boundary("outer", cuboid(DMat4::from_scale(DVec3::splat(3.0))), outer));
+    let turned = DMat4::from_rotation_y(0.5) * DMat4::from_rotation_x(0.3) * DMat4::from_scale(DVec3::splat(0.6));
+    scene.shapes.push(Shape::boundary("inner", cuboid(turned), inner));
+    let mut mesh = icosphere(2);
+    mesh.positions.iter_mut().for_each(|p| *p *= 0.4);
+    scene.shapes.push(Shape::boundary("core", Geometry::Mesh(mesh), core));
+    scene.shapes.push(Shape::lamp("lamp", quad(v(-1.0, 2.0, -1.0), DVec3::X * 2.0, DVec3::Z * 2.0), v(3.0, 4.0, 5.0)));
+    scene.lights.push(Light::Constant { radiance: v(0.5, 0.3, 0.2) });
+    scene
+}
+
+/// A medium that absorbs nothing, before a constant environment.
+pub fn furnace(geometry: Geometry, sigma_t: f64, g: f64) -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    let medium = scene.add_medium(gray(sigma_t, 1.0, g));
+    scene.shapes.push(Shape::boundary("medium", geometry, medium));
+    scene.lights.push(Light::Constant { radiance: DVec3::ONE });
+    scene
+}
+
+/// A point light in fog that fills everything, over a floor, beside a dense ball.
+pub fn point_light() -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    let fog = scene.add_medium(gray(0.15, 0.95, 0.3));
+    let dense = scene.add_medium(gray(8.0, 0.9, 0.0));
+    scene.camera.medium = Some(fog);
+    let floor = quad(v(-3.0, -1.0, 3.0), DVec3::X * 6.0, DVec3::NEG_Z * 6.0);
+    scene.shapes.push(Shape::diffuse("floor", floor, DVec3::splat(0.5)));
+    scene.shapes.push(Shape::boundary("ball", ball(v(-0.5, -0.3, 0.0), 0.5), dense));
+    scene.lights.push(Light::Point { position: v(0.7, 0.6, 0.4), intensity: v(3.0, 2.0, 4.0) });
+    scene
+}
+
+/// A glowing ball in a box, and a triangle that glows.
+pub fn sphere_light() -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    walls(&mut scene);
+    scene.shapes.push(Shape::lamp("ball", ball(v(-0.3, 0.3, -0.2), 0.25), v(4.0, 5.0, 6.0)));
+    let corners = vec![v(0.2, 0.9, -0.2), v(0.7, 0.9, -0.2), v(0.5, 0.9, 0.4)];
+    let triangle = Geometry::Mesh(Mesh { positions: corners, triangles: vec![[0, 1, 2]] });
+    scene.shapes.push(Shape::lamp("triangle", triangle, v(9.0, 6.0, 3.0)));
+    let haze = scene.add_medium(gray(1.5, 0.7, 0.0));
+    scene.shapes.push(Shape::boundary("haze", ball(v(0.3, -0.5, 0.2), 0.4), haze));
+    scene
+}
+
+/// All scenes of this file, by name.
+pub fn all() -> Vec<(&'static str, Scene)> {
+    vec![
+        ("gray box", gray_box()),
+        ("nested media", nested_media()),
+        ("furnace", furnace(cuboid(DMat4::IDENTITY), 3.0, 0.5)),
+        ("point light", point_light()),
+        ("sphere light", sphere_light()),
+    ]
+}
