@@ -4,6 +4,7 @@ use std::path::Path;
 
 use tyndall::gpu::{self, Device, DeviceChoice, DeviceDescription};
 use tyndall::pack::Packed;
+use tyndall::reference;
 use tyndall::render::{Backend, BackendError};
 use tyndall::scene::Scene;
 use tyndall::scene::mitsuba::{self, Loaded};
@@ -21,7 +22,7 @@ pub fn open(choice: &str, scene: &Scene, seed: u32, warn: &mut dyn FnMut(&str)) 
     let packed = Packed::new(scene, seed).map_err(|error| CliError::Scene(error.to_string()))?;
     packed.warnings.iter().for_each(|warning| warn(warning));
     if choice == "reference" {
-        return Err(CliError::NoDevice("soon".into()));
+        return Ok(Box::new(reference::Renderer::new(packed)));
     }
     let choice = match (choice, choice.parse()) {
         ("auto", _) => DeviceChoice::Best,
