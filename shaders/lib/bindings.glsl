@@ -1,12 +1,14 @@
 // The tables of the scene and the buffers of the kernel: by address where the device can (lavapipe gathers these with vector
-// loads), else as storage buffers. Both forms have the same descriptors and the same push constants.
+// loads), else as storage buffers. Both forms have the same descriptors and the same push constants. Nodes and primitives,
+// which every step of a traversal loads, come in words of 64 bits: half as many gathers.
 #include "lib/layout.glsl"
 #include "lib/features.glsl"
 
 #ifdef USE_BUFFER_REFERENCE
 #extension GL_EXT_buffer_reference : require
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer NodesAddress { uvec4 at[]; };
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PrimitivesAddress { Primitive at[]; };
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer NodesAddress { u64vec2 at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PrimitivesAddress { u64vec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer SurfacesAddress { Surface at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MediaAddress { Medium at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LightsAddress { Light at[]; };
@@ -23,8 +25,17 @@ layout(push_constant) uniform Push {
     uvec2 unused;
     Dispatch work;
 } push;
-#define NODE(i) push.nodes.at[i]
-#define PRIMITIVE(i) push.primitives.at[i]
+uvec4 load_words(u64vec2 words) {
+    return uvec4(unpack32(words.x), unpack32(words.y));
+}
+Primitive load_primitive(uint i) {
+    uvec4 a = load_words(push.primitives.at[3u * i]);
+    uvec4 b = load_words(push.primitives.at[3u * i + 1u]);
+    uvec4 c = load_words(push.primitives.at[3u * i + 2u]);
+    return Primitive(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), uintBitsToFloat(c.w));
+}
+#define NODE(i) load_words(push.nodes.at[i])
+#define PRIMITIVE(i) load_primitive(i)
 #define SURFACE(i) push.surfaces.at[i]
 #define MEDIUM(i) push.media.at[i]
 #define LIGHT(i) push.lights.at[i]

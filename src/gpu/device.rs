@@ -162,7 +162,7 @@ pub struct Device {
     pub info: DeviceInfo,
     /// Invocations that run in step; workgroups have this size.
     pub subgroup_size: u32,
-    /// Buffers have addresses that kernels can use.
+    /// Buffers have addresses that kernels can use, and kernels know words of 64 bits.
     pub buffer_reference: bool,
     /// Host memory and device memory are one.
     pub is_cpu: bool,
@@ -183,13 +183,16 @@ impl Device {
             loader.instance.get_physical_device_features2(candidate.physical, &mut features);
         }
         let is_cpu = properties.properties.device_type == vk::PhysicalDeviceType::CPU;
-        let buffer_reference = supported.buffer_device_address == vk::TRUE;
+        let int64 = features.features.shader_int64;
+        let buffer_reference = supported.buffer_device_address == vk::TRUE && int64 == vk::TRUE;
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(candidate.queue_family)
             .queue_priorities(&priorities)];
         let mut wanted = vk::PhysicalDeviceVulkan12Features::default().buffer_device_address(buffer_reference);
-        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut wanted);
+        let basic = vk::PhysicalDeviceFeatures::default().shader_int64(buffer_reference);
+        let info =
+            vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&basic).push_next(&mut wanted);
         // SAFETY: the structures outlive the call, and only supported features are asked for.
         let raw = check("vkCreateDevice", unsafe { loader.instance.create_device(candidate.physical, &info, None) })?;
         let allocator = Allocator::new(&AllocatorCreateDesc {

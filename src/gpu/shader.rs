@@ -83,7 +83,7 @@ pub fn expand_with(
     head += "#extension GL_KHR_shader_subgroup_arithmetic : require\n";
     head += &format!("#define WORKGROUP {}u\n", variant.workgroup);
     if variant.buffer_reference {
-        head += "#define USE_BUFFER_REFERENCE\n#extension GL_EXT_buffer_reference : require\n";
+        head += "#define USE_BUFFER_REFERENCE\n#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n";
     }
     let mut expansion = Expansion { find: &generated, seen: HashSet::new(), text: head };
     expansion.append(name, ("(the program)", 0))?;
