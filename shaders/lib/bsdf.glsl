@@ -1,12 +1,268 @@
-// What surfaces do to light. Cosines are those to the normal on the side of the incident ray.
+// What surfaces do to light. Directions are in the local frame of the surface, z along its normal (for a surface with two
+// different sides, towards the outside), and point away from the surface: wi to where the path comes from, wo to where it goes
+// on. Values include the cosine of wo. Densities are per solid angle; a direction without a density (a mirror's) has pdf 0.
 #include "lib/constants.glsl"
+#include "lib/math.glsl"
+#include "lib/warp.glsl"
 
-// Lambert's law: BSDF times cosine, divided by the reflectance. [1/sr]
-float eval_diffuse(float cos_out) {
-    return max(cos_out, 0.0) * INV_PI;
+struct BsdfValue {
+    vec3 value;     // BSDF times |cos wo|, [1/sr]
+    float pdf;      // with which sample_bsdf finds wo
+};
+
+struct BsdfSample {
+    vec3 direction;
+    vec3 weight;    // value / pdf; for a direction without a density, the limit of this. Radiance that is refracted into or out
+                    // of a body scales with the square of the index (Veach 1997, section 5.2)
+    float pdf;      // 0: no density
+    float eta;      // index behind the surface over that in front of it, if the direction crosses; else 1
+};
+
+// Fresnel's equations, unpolarised. cos_i is signed, positive outside; eta is the index inside over the one outside. cos_t is
+// the cosine of refraction, with the opposite sign; both are computed without cancellation near total reflection.
+float fresnel_dielectric(float cos_i, float eta, out float cos_t) {
+    float n = cos_i >= 0.0 ? eta : 1.0 / eta;
+    float c = abs(cos_i);
+    float sin_t_squared = (1.0 - c) * (1.0 + c) / (n * n);
+    if (sin_t_squared >= 1.0) {
+        cos_t = 0.0;
+        return 1.0;
+    }
+    float t = sqrt(1.0 - sin_t_squared);
+    float s = (c - n * t) / (c + n * t);
+    float p = (n * c - t) / (n * c + t);
+    cos_t = cos_i >= 0.0 ? -t : t;
+    return 0.5 * (s * s + p * p);
 }
 
-// Density, per solid angle, of cosine-distributed directions; equal to eval_diffuse, so the sampling weight is the reflectance.
-float diffuse_pdf(float cos_out) {
-    return max(cos_out, 0.0) * INV_PI;
+// Fresnel's equations for a conductor with complex index eta + i k, relative to what is outside (Born and Wolf 1999, 14.2).
+vec3 fresnel_conductor(float cos_i, vec3 eta, vec3 k) {
+    float c2 = cos_i * cos_i, s2 = 1.0 - c2;
+    vec3 t0 = eta * eta - k * k - s2;
+    vec3 a2b2 = sqrt(t0 * t0 + 4.0 * k * k * eta * eta);
+    vec3 a = sqrt(max(0.5 * (a2b2 + t0), vec3(0.0)));
+    vec3 t1 = a2b2 + c2, t2 = 2.0 * a * cos_i;
+    vec3 s = (t1 - t2) / (t1 + t2);
+    vec3 t3 = a2b2 * c2 + s2 * s2, t4 = t2 * s2;
+    vec3 p = s * (t3 - t4) / (t3 + t4);
+    return 0.5 * (s + p);
+}
+
+// Density of microfacet normals, [1/sr], for normals with z > 0. Beckmann (1963) or GGX (Walter et al. 2007).
+float facet_density(vec3 m, float alpha, bool ggx) {
+    if (m.z <= 0.0) {
+        return 0.0;
+    }
+    float c2 = m.z * m.z;
+    float tan2 = (m.x * m.x + m.y * m.y) / c2;
+    float a2 = alpha * alpha;
+    if (ggx) {
+        float d = 1.0 + tan2 / a2;
+        return 1.0 / (PI * a2 * c2 * c2 * d * d);
+    }
+    return exp_minus(tan2 / a2) / (PI * a2 * c2 * c2);
+}
+
+// Smith's masking of direction v for facets with normal m.
+float facet_masking(vec3 v, vec3 m, float alpha, bool ggx) {
+    if (dot(v, m) * v.z <= 0.0) {
+        return 0.0;
+    }
+    float tan2 = (v.x * v.x + v.y * v.y) / (v.z * v.z);
+    if (tan2 == 0.0) {
+        return 1.0;
+    }
+    if (ggx) {
+        return 2.0 / (1.0 + sqrt(1.0 + alpha * alpha * tan2));
+    }
+    // Walter et al.'s (2007) rational approximation, relative error below 0.35 %.
+    float a = 1.0 / (alpha * sqrt(tan2));
+    return a >= 1.6 ? 1.0 : (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a);
+}
+
+// A facet normal with density facet_density * m.z.
+vec3 sample_facet(vec2 u, float alpha, bool ggx) {
+    float tan2 = ggx ? alpha * alpha * u.x / (1.0 - u.x) : alpha * alpha * minus_log_1m(u.x);
+    float c = inversesqrt(1.0 + tan2);
+    return from_polar(c, sqrt(tan2) * c, u.y);
+}
+
+uint bsdf_kind(Surface surface) {
+    return surface.flags >> SURFACE_KIND_SHIFT;
+}
+
+bool is_ggx(Surface surface) {
+    return (surface.flags & SURFACE_GGX) != 0u;
+}
+
+vec3 reflect_z(vec3 w) {
+    return vec3(-w.xy, w.z);
+}
+
+// The direction opposite to w on the other side of a facet with normal m, bent by Snell's law.
+vec3 refract_at(vec3 w, vec3 m, float cos_t, float eta) {
+    float c = dot(w, m);
+    float scale = c >= 0.0 ? 1.0 / eta : eta;
+    return m * (c * scale + cos_t) - w * scale;
+}
+
+// The diffuse lobe of plastic: light refracted in, scattered, and refracted out again (Mitsuba's model, after Jakob 2010;
+// internal reflection adds up to a geometric series).
+vec3 plastic_diffuse(Surface surface, float fresnel_i, float fresnel_o) {
+    vec3 body = surface.reflectance;
+    bool nonlinear = (surface.flags & SURFACE_NONLINEAR) != 0u;
+    body /= 1.0 - (nonlinear ? body * surface.internal_reflectance : vec3(surface.internal_reflectance));
+    return body * ((1.0 - fresnel_i) * (1.0 - fresnel_o) / (surface.eta * surface.eta));
+}
+
+// Probability of plastic's specular lobe.
+float plastic_specular_probability(Surface surface, float fresnel_i) {
+    float specular = fresnel_i * surface.specular_weight;
+    return specular / max(specular + (1.0 - fresnel_i) * (1.0 - surface.specular_weight), 1e-30);
+}
+
+BsdfValue eval_bsdf(Surface surface, vec3 wi, vec3 wo) {
+    BsdfValue none = BsdfValue(vec3(0.0), 0.0);
+    uint kind = bsdf_kind(surface);
+    float unused;
+    if (kind == BSDF_DIFFUSE) {
+        float pdf = wi.z > 0.0 && wo.z > 0.0 ? wo.z * INV_PI : 0.0;
+        return BsdfValue(surface.reflectance * pdf, pdf);
+    }
+    if (HAS_PLASTIC && kind == BSDF_PLASTIC) {
+        if (wi.z <= 0.0 || wo.z <= 0.0) {
+            return none;
+        }
+        float fi = fresnel_dielectric(wi.z, surface.eta, unused), fo = fresnel_dielectric(wo.z, surface.eta, unused);
+        float diffuse_probability = 1.0 - plastic_specular_probability(surface, fi);
+        vec3 value = plastic_diffuse(surface, fi, fo) * (wo.z * INV_PI);
+        float pdf = diffuse_probability * wo.z * INV_PI;
+        if (surface.alpha > 0.0) {
+            vec3 m = normalize(wi + wo);
+            float density = facet_density(m, surface.alpha, is_ggx(surface));
+            float masking = facet_masking(wi, m, surface.alpha, is_ggx(surface)) * facet_masking(wo, m, surface.alpha, is_ggx(surface));
+            float f = fresnel_dielectric(dot(wi, m), surface.eta, unused);
+            value += surface.specular * (f * density * masking / (4.0 * wi.z));
+            pdf += (1.0 - diffuse_probability) * density * m.z / (4.0 * dot(wi, m));
+        }
+        return BsdfValue(value, pdf);
+    }
+    if (surface.alpha == 0.0) {
+        return none;
+    }
+    if (HAS_CONDUCTOR && kind == BSDF_CONDUCTOR) {
+        if (wi.z <= 0.0 || wo.z <= 0.0) {
+            return none;
+        }
+        vec3 m = normalize(wi + wo);
+        float density = facet_density(m, surface.alpha, is_ggx(surface));
+        float masking = facet_masking(wi, m, surface.alpha, is_ggx(surface)) * facet_masking(wo, m, surface.alpha, is_ggx(surface));
+        vec3 f = fresnel_conductor(dot(wi, m), surface.transmittance, surface.extinction);
+        return BsdfValue(surface.specular * f * (density * masking / (4.0 * wi.z)), density * m.z / (4.0 * dot(wi, m)));
+    }
+    if (HAS_DIELECTRIC && kind == BSDF_DIELECTRIC) {
+        if (wi.z == 0.0 || wo.z == 0.0) {
+            return none;
+        }
+        // The facet's normal for reflection or refraction, on the outside (Walter et al. 2007, equations 13 and 16).
+        bool reflects = wi.z * wo.z > 0.0;
+        float eta = wi.z > 0.0 ? surface.eta : 1.0 / surface.eta;
+        vec3 m = normalize(wi + wo * (reflects ? 1.0 : eta));
+        m = m.z < 0.0 ? -m : m;
+        float ci = dot(wi, m), co = dot(wo, m);
+        if (ci * wi.z <= 0.0 || co * wo.z <= 0.0) {
+            return none;
+        }
+        float density = facet_density(m, surface.alpha, is_ggx(surface));
+        float masking = facet_masking(wi, m, surface.alpha, is_ggx(surface)) * facet_masking(wo, m, surface.alpha, is_ggx(surface));
+        float f = fresnel_dielectric(ci, surface.eta, unused);
+        if (reflects) {
+            return BsdfValue(surface.specular * (f * density * masking / (4.0 * abs(wi.z))), f * density * m.z / (4.0 * abs(ci)));
+        }
+        // The Jacobian eta^2 |co| / (ci + eta co)^2; radiance divides it by eta^2.
+        float jacobian = abs(co) / ((ci + eta * co) * (ci + eta * co));
+        vec3 value = surface.transmittance * ((1.0 - f) * density * masking * jacobian * abs(ci / wi.z));
+        return BsdfValue(value, (1.0 - f) * density * m.z * jacobian * eta * eta);
+    }
+    return none;
+}
+
+BsdfSample sample_smooth_dielectric(Surface surface, vec3 wi, float lobe) {
+    float cos_t;
+    float f = fresnel_dielectric(wi.z, surface.eta, cos_t);
+    if ((surface.flags & SURFACE_THIN) != 0u) {
+        // Reflections between the two faces add up; what gets through is not bent.
+        f = f < 1.0 ? 2.0 * f / (1.0 + f) : 1.0;
+        return lobe < f ? BsdfSample(reflect_z(wi), surface.specular, 0.0, 1.0)
+                              : BsdfSample(-wi, surface.transmittance, 0.0, 1.0);
+    }
+    if (lobe < f) {
+        return BsdfSample(reflect_z(wi), surface.specular, 0.0, 1.0);
+    }
+    float eta = wi.z > 0.0 ? surface.eta : 1.0 / surface.eta;
+    return BsdfSample(vec3(-wi.xy / eta, cos_t), surface.transmittance / (eta * eta), 0.0, eta);
+}
+
+// u chooses within a lobe, `lobe` between them.
+BsdfSample sample_bsdf(Surface surface, vec3 wi, vec2 u, float lobe) {
+    BsdfSample none = BsdfSample(vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0, 1.0);
+    uint kind = bsdf_kind(surface);
+    float unused;
+    BsdfSample found = none;
+    if (kind == BSDF_DIFFUSE) {
+        found.direction = square_to_cosine_hemisphere(u);
+        found.pdf = wi.z > 0.0 ? found.direction.z * INV_PI : 0.0;
+        found.weight = wi.z > 0.0 ? surface.reflectance : vec3(0.0);
+        return found;
+    }
+    if (HAS_DIELECTRIC && kind == BSDF_DIELECTRIC && surface.alpha == 0.0) {
+        return sample_smooth_dielectric(surface, wi, lobe);
+    }
+    if (wi.z == 0.0 || (kind != BSDF_DIELECTRIC && wi.z < 0.0)) {
+        return none;
+    }
+    if (HAS_CONDUCTOR && kind == BSDF_CONDUCTOR && surface.alpha == 0.0) {
+        return BsdfSample(reflect_z(wi), surface.specular * fresnel_conductor(wi.z, surface.transmittance, surface.extinction), 0.0, 1.0);
+    }
+    if (HAS_PLASTIC && kind == BSDF_PLASTIC) {
+        float f = fresnel_dielectric(wi.z, surface.eta, unused);
+        float p = plastic_specular_probability(surface, f);
+        if (lobe >= p) {
+            found.direction = square_to_cosine_hemisphere(u);
+        } else if (surface.alpha == 0.0) {
+            return BsdfSample(reflect_z(wi), surface.specular * (f / p), 0.0, 1.0);
+        } else {
+            vec3 m = sample_facet(u, surface.alpha, is_ggx(surface));
+            found.direction = 2.0 * dot(wi, m) * m - wi;
+        }
+    } else {
+        vec3 m = sample_facet(u, surface.alpha, is_ggx(surface));
+        found.direction = 2.0 * dot(wi, m) * m - wi;
+        if (HAS_DIELECTRIC && kind == BSDF_DIELECTRIC) {
+            float cos_t;
+            float f = fresnel_dielectric(dot(wi, m), surface.eta, cos_t);
+            if (lobe >= f) {
+                found.direction = refract_at(wi, m, cos_t, surface.eta);
+                found.eta = wi.z > 0.0 ? surface.eta : 1.0 / surface.eta;
+                if (found.direction.z * wi.z >= 0.0) {
+                    return none;
+                }
+            } else if (found.direction.z * wi.z <= 0.0) {
+                return none;
+            }
+        }
+    }
+    BsdfValue value = eval_bsdf(surface, wi, found.direction);
+    if (value.pdf <= 0.0) {
+        return none;
+    }
+    found.pdf = value.pdf;
+    found.weight = value.value / value.pdf;
+    return found;
+}
+
+// Whether sample_bsdf finds directions with a density at all, so that light sampling can compete.
+bool bsdf_has_density(Surface surface) {
+    uint kind = bsdf_kind(surface);
+    return kind == BSDF_DIFFUSE || kind == BSDF_PLASTIC || surface.alpha > 0.0;
 }

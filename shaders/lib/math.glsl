@@ -45,6 +45,13 @@ vec3 from_frame(vec3 axis, vec3 local) {
     return normalize(tangent * local.x + bitangent * local.y + axis * local.z);
 }
 
+// The components of a direction in that frame.
+vec3 to_frame(vec3 axis, vec3 direction) {
+    vec3 tangent, bitangent;
+    orthonormal_frame(axis, tangent, bitangent);
+    return vec3(dot(tangent, direction), dot(bitangent, direction), dot(axis, direction));
+}
+
 float max_component(vec3 v) {
     return max(v.x, max(v.y, v.z));
 }

@@ -52,8 +52,14 @@ struct Path {
     vec3 light_weight;      // what arrives if nothing is in the way
     float pdf_ratio;        // density of the light's direction by scattering over that by light sampling; 0 for a point
     uint light;             // the light it goes to
-    float offset;           // the surface's, 0 in a medium
+    vec3 light_channels;    // chromatic media: the throughput that scattering towards the light would have
+    uint light_medium;      // where dielectrics are: the medium in which the shadow ray begins
+    // The vertex.
+    vec3 point;
+    float offset;           // of rays that leave a surface, along its normal; 0 in a medium
     vec3 normal;            // only valid when offset > 0
+    uint next_medium;       // where dielectrics are: the medium of the next segment
+    float eta_scale;        // where dielectrics are: the product of squared indices that refraction divided radiance by
 };
 
 // What the traversal found.
@@ -126,6 +132,7 @@ void path_start(inout Path path) {
     path.depth = 0u;
     path.pdf = 0.0;
     path.alive = true;
+    path.eta_scale = 1.0;
     path.medium = params.camera_medium;
     begin_segment(path, u.zw);
 }
@@ -188,35 +195,59 @@ void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
 // A point where light is scattered, in a medium or on a surface.
 struct Vertex {
     vec3 point;
-    vec3 axis;      // normal on the side of the incident ray; in a medium, the direction of propagation
+    vec3 axis;      // z of the surface's local frame; in a medium, the direction of propagation
     bool in_medium;
-    float g;
+    float g;        // of the medium
+    vec3 albedo;    // of the medium, with the weight of the flight
+    Surface surface;
+    vec3 incident;  // on a surface: towards where the path comes from, in the local frame
 };
 
-// Scattering function times cosine over the albedo or reflectance: also the density with which directions are sampled.
-float eval_scattering(Vertex vertex, vec3 direction) {
+// Scattering function times cosine, and the density with which directions are sampled.
+BsdfValue eval_scattering(Vertex vertex, vec3 direction) {
     if (HAS_MEDIA && vertex.in_medium) {
-        return HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(vertex.g, vertex.axis, direction) : INV_4PI;
+        float phase = HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(vertex.g, vertex.axis, direction) : INV_4PI;
+        return BsdfValue(vertex.albedo * phase, phase);
     }
-    return eval_diffuse(dot(vertex.axis, direction));
+    return eval_bsdf(vertex.surface, vertex.incident, to_frame(vertex.axis, direction));
 }
 
-vec3 sample_scattering(Vertex vertex, vec2 u) {
+BsdfSample sample_scattering(Vertex vertex, vec2 u, float lobe) {
     if (HAS_MEDIA && vertex.in_medium) {
-        if (HAS_HENYEY_GREENSTEIN) {
+        vec3 direction;
+        if (HAS_HENYEY_GREENSTEIN && vertex.g != 0.0) {
             PhaseAngle angle = sample_henyey_greenstein(vertex.g, u.x);
-            vec3 local = from_polar(angle.cos_theta, angle.sin_theta, u.y);
-            // For g = 0 this is square_to_sphere(u), to the last bit, and no axis matters: so kernels with and without
-            // Henyey and Greenstein's function render the same image.
-            return vertex.g == 0.0 ? local : from_frame(vertex.axis, local);
+            direction = from_frame(vertex.axis, from_polar(angle.cos_theta, angle.sin_theta, u.y));
+        } else {
+            direction = square_to_sphere(u);
         }
-        return square_to_sphere(u);
+        return BsdfSample(direction, vertex.albedo, eval_scattering(vertex, direction).pdf, 1.0);
     }
-    return from_frame(vertex.axis, square_to_cosine_hemisphere(u));
+    BsdfSample found = sample_bsdf(vertex.surface, vertex.incident, u, lobe);
+    found.direction = from_frame(vertex.axis, found.direction);
+    return found;
+}
+
+// Where a ray in some direction begins so that it does not meet the surface it leaves.
+vec3 offset_origin(Path path, vec3 direction) {
+    return path.point + path.normal * (dot(path.normal, direction) >= 0.0 ? path.offset : -path.offset);
+}
+
+// The medium on the side of a surface to which a direction goes, for a path that came in `medium`.
+uint medium_towards(Vertex vertex, uint medium, vec3 direction) {
+    if (!HAS_DIELECTRIC || vertex.in_medium || (vertex.surface.flags & SURFACE_ORIENTED) == 0u) {
+        return medium;
+    }
+    bool outwards = dot(vertex.axis, direction) > 0.0;
+    if (outwards == (vertex.incident.z > 0.0) || vertex.surface.media == 0u) {
+        return medium;
+    }
+    uint inside = vertex.surface.media & 0xffffu, outside = vertex.surface.media >> 16u;
+    return cross_boundary(medium, outwards ? inside : outside, outwards ? outside : inside);
 }
 
 // Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.
-bool sample_light(inout Path path, Vertex vertex, vec2 u) {
+bool sample_light(inout Path path, Vertex vertex, vec2 u, float lobe) {
     if (!HAS_LIGHT_SAMPLING) {
         return false;
     }
@@ -231,9 +262,9 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u) {
     if (HAS_CONSTANT_LIGHT && light.kind == LIGHT_CONSTANT) {
         // No direction is better than another, so the scattering function samples them; what light sampling adds is the
         // transmittance, exact instead of 0 or 1.
-        vec3 direction = sample_scattering(vertex, u);
-        float pdf = eval_scattering(vertex, direction);
-        found = LightSample(direction, INFINITE_DISTANCE, pdf > 0.0 ? light.radiance / pdf : vec3(0.0), pdf);
+        BsdfSample scattered = sample_scattering(vertex, u, lobe);
+        vec3 weight = scattered.pdf > 0.0 ? light.radiance / scattered.pdf : vec3(0.0);
+        found = LightSample(scattered.direction, INFINITE_DISTANCE, weight, scattered.pdf);
     } else if (HAS_POINT_LIGHTS && light.kind == LIGHT_POINT) {
         found = sample_point_light(light, vertex.point);
     } else if (HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE) {
@@ -241,34 +272,40 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u) {
     } else {
         found = sample_plane_light(light, vertex.point, u);
     }
-    float scattering = eval_scattering(vertex, found.direction);
+    BsdfValue scattering = eval_scattering(vertex, found.direction);
     path.direction = found.direction;
     path.t_max = found.distance;
     path.light = index;
-    path.light_weight = path.throughput * found.weight * (scattering / light.probability);
-    path.pdf_ratio = found.pdf > 0.0 ? scattering / (found.pdf * light.probability) : 0.0;
+    path.light_channels = path.throughput * scattering.value;
+    path.light_weight = path.light_channels * found.weight / light.probability;
+    path.pdf_ratio = found.pdf > 0.0 ? scattering.pdf / (found.pdf * light.probability) : 0.0;
+    path.light_medium = medium_towards(vertex, path.medium, found.direction);
+    path.origin = offset_origin(path, found.direction);
     return max_component(path.light_weight) > 0.0;
 }
 
 // Scatters at a vertex: the shadow ray, the next direction, roulette.
-void scatter(inout Path path, Vertex vertex, vec3 albedo) {
+void scatter(inout Path path, Vertex vertex) {
     path.depth += 1u;
-    path.throughput *= albedo;
-    path.alive = max_component(path.throughput) > 0.0 && path.depth < MAX_DEPTH;
     path.shadow = false;
+    path.alive = path.depth < MAX_DEPTH;
     if (!path.alive) {
         return;
     }
     vec4 u = sample_set(path, 2u * path.segment + 1u);
-    path.next_direction = sample_scattering(vertex, u.zw);
-    path.pdf = eval_scattering(vertex, path.next_direction);
-    path.alive = path.pdf > 0.0;
-    path.normal = vertex.axis;
-    path.origin = vertex.point;
+    float lobe = HAS_LOBES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
+    BsdfSample next = sample_scattering(vertex, u.zw, lobe);
+    path.point = vertex.point;
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
-    path.shadow = sample_light(path, vertex, u.xy);
+    path.shadow = (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface)) && sample_light(path, vertex, u.xy, u.z);
+    path.next_direction = next.direction;
+    path.next_medium = medium_towards(vertex, path.medium, next.direction);
+    path.throughput *= next.weight;
+    path.pdf = next.pdf;
+    path.eta_scale *= next.eta * next.eta;
+    path.alive = max_component(path.throughput) > 0.0;
 }
 
 // Begins the segment after a vertex, unless roulette ends the path.
@@ -277,11 +314,13 @@ void next_segment(inout Path path) {
     vec4 u = sample_set(path, 2u * path.segment);
     if (path.depth >= RR_DEPTH) {
         float most = path.depth < RELENTLESS_DEPTH ? 1.0 : 0.95;
-        float keep = min(3.0 * max_component(path.throughput), most);
+        float keep = min(3.0 * max_component(path.throughput) * (HAS_DIELECTRIC ? path.eta_scale : 1.0), most);
         path.alive = path.alive && u.x < keep;
         path.throughput /= keep;
     }
     path.direction = path.next_direction;
+    path.origin = offset_origin(path, path.direction);
+    path.medium = HAS_DIELECTRIC ? path.next_medium : path.medium;
     path.t_min = 0.0;
     begin_segment(path, u.zw);
 }
@@ -331,7 +370,9 @@ void path_advance(inout Path path, Hit hit) {
         }
         vec3 point = path.origin + path.direction * t;
         path.offset = 0.0;
-        scatter(path, Vertex(point, path.direction, true, medium.g), weight);
+        path.normal = path.direction;
+        Surface none;
+        scatter(path, Vertex(point, path.direction, true, medium.g, weight, none, vec3(0.0)));
     } else {
         Primitive primitive = PRIMITIVE(hit.primitive);
         Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
@@ -350,10 +391,15 @@ void path_advance(inout Path path, Hit hit) {
         add_emission(path, primitive, t, normal);
         path.throughput = survived_throughput(path);
         bool back = dot(path.direction, normal) > 0.0;
-        bool black = HAS_ONE_SIDED && back && (surface.flags & SURFACE_TWO_SIDED) == 0u;
-        vec3 axis = back ? -normal : normal;
+        if (HAS_ONE_SIDED && back && (surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED)) == 0u) {
+            path.alive = false;
+            path.shadow = false;
+            return;
+        }
+        vec3 axis = back && !(HAS_DIELECTRIC && (surface.flags & SURFACE_ORIENTED) != 0u) ? -normal : normal;
         path.offset = offset_distance(largest);
-        scatter(path, Vertex(point + axis * path.offset, axis, false, 0.0), black ? vec3(0.0) : surface.reflectance);
+        path.normal = axis;
+        scatter(path, Vertex(point, axis, false, 0.0, vec3(0.0), surface, to_frame(axis, -path.direction)));
     }
     if (!path.shadow && path.alive) {
         next_segment(path);
@@ -368,7 +414,7 @@ void path_light(inout Path path, Hit hit) {
         if (HAS_MEDIA) {
             if (HAS_CHROMATIC) {
                 transmittance = exp_minus(max(hit.tau_rgb, vec3(0.0)));
-                survives = dot(channel_weights(path.throughput), transmittance);
+                survives = dot(channel_weights(path.light_channels), transmittance);
             } else {
                 survives = exp_minus(max(hit.tau, 0.0));
                 transmittance = vec3(survives);
@@ -397,7 +443,8 @@ vec3 depth_at_infinity(Path path) {
 Hit begin_hit(Path path) {
     Hit hit = Hit(path.t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false);
     if (HAS_MEDIA && HAS_LIGHT_SAMPLING && path.shadow) {
-        vec3 tau = MEDIUM(valid_medium(path.medium)).sigma_t * shadow_length(path) + depth_at_infinity(path);
+        uint medium = HAS_DIELECTRIC ? path.light_medium : path.medium;
+        vec3 tau = MEDIUM(valid_medium(medium)).sigma_t * shadow_length(path) + depth_at_infinity(path);
         hit.tau = tau.x;
         hit.tau_rgb = tau;
     }

@@ -29,6 +29,12 @@ pub struct Features {
     pub many_lights: bool,
     /// A surface whose back is black.
     pub one_sided: bool,
+    /// Glass, smooth or rough.
+    pub dielectric: bool,
+    /// Metal, smooth or rough.
+    pub conductor: bool,
+    /// A diffuse body under a varnish.
+    pub plastic: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
     /// Emitters are not seen by the camera directly.
@@ -49,6 +55,7 @@ impl Features {
         let Integrator { max_depth, rr_depth, hide_emitters } = scene.integrator;
         let media = packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
         let kind = |kind: u32| packed.lights.iter().any(|light| light.kind == kind);
+        let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
         let area_lights = kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD) || kind(LIGHT_SPHERE);
         let max_depth = max_depth.unwrap_or(u32::MAX);
         Features {
@@ -63,6 +70,9 @@ impl Features {
             constant_light: kind(LIGHT_CONSTANT),
             many_lights: packed.lights.len() > 1,
             one_sided: packed.surfaces.iter().any(|surface| surface.flags & SURFACE_TWO_SIDED == 0),
+            dielectric: bsdf(BSDF_DIELECTRIC),
+            conductor: bsdf(BSDF_CONDUCTOR),
+            plastic: bsdf(BSDF_PLASTIC),
             far_clip: {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
@@ -90,6 +100,9 @@ impl Features {
             constant_light: true,
             many_lights: true,
             one_sided: true,
+            dielectric: true,
+            conductor: true,
+            plastic: true,
             far_clip: true,
             ..self
         }
@@ -109,6 +122,10 @@ impl Features {
             ("HAS_CONSTANT_LIGHT", self.constant_light),
             ("HAS_MANY_LIGHTS", self.many_lights),
             ("HAS_ONE_SIDED", self.one_sided),
+            ("HAS_DIELECTRIC", self.dielectric),
+            ("HAS_CONDUCTOR", self.conductor),
+            ("HAS_PLASTIC", self.plastic),
+            ("HAS_LOBES", self.dielectric || self.conductor || self.plastic),
             ("HAS_FAR_CLIP", self.far_clip),
             ("HAS_HIDDEN_EMITTERS", self.hide_emitters),
             ("HAS_LIGHT_SAMPLING", self.light_sampling),

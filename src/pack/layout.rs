@@ -111,14 +111,34 @@ gpu_struct! {
 gpu_struct! {
     /// What the primitives of one shape have in common.
     pub struct Surface {
-        /// Reflected fraction of each channel.
+        /// Diffusely reflected fraction of each channel.
         reflectance: Vec3,
-        /// Bit 0: reflects on both sides.
+        /// The `SURFACE_` bits, and the kind of BSDF above [`SURFACE_KIND_SHIFT`].
         flags: u32,
         /// Of a boundary: sigma_t inside minus sigma_t outside.
         sigma_t_step: Vec3,
         /// Of a boundary: the medium inside (low 16 bits) and outside (high 16 bits); 0 is vacuum.
         media: u32,
+        /// Factor of specular reflection.
+        specular: Vec3,
+        /// Refractive index inside over the one outside.
+        eta: f32,
+        /// Factor of specular transmission; of a conductor, the real part of its index.
+        transmittance: Vec3,
+        /// Roughness of microfacets; 0 is smooth.
+        alpha: f32,
+        /// Of a conductor, the imaginary part of its index.
+        extinction: Vec3,
+        /// Of plastic, the diffuse reflectance of its boundary from inside.
+        internal_reflectance: f32,
+        /// Of plastic, the share of the specular lobe in sampling, before Fresnel.
+        specular_weight: f32,
+        /// Fills the sixteen bytes.
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
+        /// Fills the sixteen bytes.
+        unused_3: u32,
     }
 }
 
@@ -240,6 +260,24 @@ pub const PRIMITIVE_BOUNDARY: u32 = 1 << 31;
 pub const PRIMITIVE_SPHERE: u32 = 1 << 30;
 /// Bit 0 of [`Surface::flags`].
 pub const SURFACE_TWO_SIDED: u32 = 1;
+/// Bit 1: microfacets are those of GGX, else of Beckmann.
+pub const SURFACE_GGX: u32 = 2;
+/// Bit 2: a thin sheet, which bends no light.
+pub const SURFACE_THIN: u32 = 4;
+/// Bit 3: colours of plastic shift with depth.
+pub const SURFACE_NONLINEAR: u32 = 8;
+/// Bit 4: the two sides differ, and directions are those of the outside.
+pub const SURFACE_ORIENTED: u32 = 16;
+/// Where the kind of BSDF begins in [`Surface::flags`].
+pub const SURFACE_KIND_SHIFT: u32 = 8;
+/// Kind of BSDF: Lambert's law.
+pub const BSDF_DIFFUSE: u32 = 0;
+/// Kind of BSDF: smooth or rough glass.
+pub const BSDF_DIELECTRIC: u32 = 1;
+/// Kind of BSDF: smooth or rough metal.
+pub const BSDF_CONDUCTOR: u32 = 2;
+/// Kind of BSDF: a diffuse body under a smooth or rough varnish.
+pub const BSDF_PLASTIC: u32 = 3;
 /// [`Light::kind`]: a triangle.
 pub const LIGHT_TRIANGLE: u32 = 0;
 /// [`Light::kind`]: a parallelogram.
@@ -263,6 +301,15 @@ pub fn glsl() -> String {
         ("PRIMITIVE_BOUNDARY", PRIMITIVE_BOUNDARY),
         ("PRIMITIVE_SPHERE", PRIMITIVE_SPHERE),
         ("SURFACE_TWO_SIDED", SURFACE_TWO_SIDED),
+        ("SURFACE_GGX", SURFACE_GGX),
+        ("SURFACE_THIN", SURFACE_THIN),
+        ("SURFACE_NONLINEAR", SURFACE_NONLINEAR),
+        ("SURFACE_ORIENTED", SURFACE_ORIENTED),
+        ("SURFACE_KIND_SHIFT", SURFACE_KIND_SHIFT),
+        ("BSDF_DIFFUSE", BSDF_DIFFUSE),
+        ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),
+        ("BSDF_CONDUCTOR", BSDF_CONDUCTOR),
+        ("BSDF_PLASTIC", BSDF_PLASTIC),
         ("LIGHT_TRIANGLE", LIGHT_TRIANGLE),
         ("LIGHT_QUAD", LIGHT_QUAD),
         ("LIGHT_SPHERE", LIGHT_SPHERE),

@@ -128,6 +128,9 @@ const EMPTY_FEATURES: Features = Features {
     constant_light: false,
     many_lights: false,
     one_sided: false,
+    dielectric: false,
+    conductor: false,
+    plastic: false,
     far_clip: false,
     hide_emitters: false,
     light_sampling: false,
@@ -178,6 +181,7 @@ fn pack_surface(shape: &Shape, exterior: Option<MediumId>, media: &[Medium]) -> 
         flags: if two_sided { SURFACE_TWO_SIDED } else { 0 },
         sigma_t_step: media[inside as usize].sigma_t - media[outside as usize].sigma_t,
         media: inside | outside << 16,
+        ..Surface::default()
     }
 }
 
