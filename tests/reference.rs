@@ -19,7 +19,11 @@ fn device_and_reference_follow_the_same_paths() {
 fn more_features_than_needed_do_not_change_the_image() {
     for (name, scene) in scenes::all() {
         let packed = scenes::pack(&scene, 8, 16);
-        let variant = |features| Variant { features, workgroup: device().subgroup_size, buffer_reference: device().buffer_reference };
+        let variant = |features| Variant {
+            features,
+            workgroup: device().subgroup_size,
+            buffer_reference: device().buffer_reference,
+        };
         let needed = images::mean(&images::with_variant(&packed, 16, &variant(packed.features)));
         let everything = images::mean(&images::with_variant(&packed, 16, &variant(packed.features.everything())));
         let share = images::compare(&needed, &everything).unwrap_or_else(|why| panic!("{name}: {why}"));

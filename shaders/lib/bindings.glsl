@@ -1,5 +1,6 @@
 // The tables of the scene and the buffers of the kernel: by address where the device can (lavapipe gathers these with vector
-// loads), else as storage buffers. Both forms have the same descriptors and the same push constants.
+// loads), else as storage buffers. Both forms have the same descriptors and the same push constants. naga, which checks the second,
+// knows no storage buffers that are only written.
 #include "lib/layout.glsl"
 #include "lib/features.glsl"
 
@@ -32,7 +33,7 @@ layout(set = 0, binding = 1, std430) readonly buffer Primitives { Primitive prim
 layout(set = 0, binding = 2, std430) readonly buffer Surfaces { Surface surfaces[]; };
 layout(set = 0, binding = 3, std430) readonly buffer Media { Medium media[]; };
 layout(set = 0, binding = 4, std430) readonly buffer Lights { Light lights[]; };
-layout(set = 0, binding = 5, std430) writeonly buffer Samples { vec4 samples[]; };
+layout(set = 0, binding = 5, std430) buffer Samples { vec4 samples[]; };
 layout(push_constant) uniform Push {
     uvec4 addresses[3];
     Dispatch work;

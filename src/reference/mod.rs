@@ -41,10 +41,7 @@ impl Renderer {
     /// Widens the tables.
     pub fn new(packed: Packed) -> Renderer {
         let driver = format!("tyndall {}", env!("CARGO_PKG_VERSION"));
-        Renderer {
-            tables: Tables::new(&packed),
-            info: DeviceInfo { name: "CPU reference (f64)".to_owned(), driver },
-        }
+        Renderer { tables: Tables::new(&packed), info: DeviceInfo { name: "CPU reference (f64)".to_owned(), driver } }
     }
 
     fn render_block(&self, samples: Range<u32>) -> Block {

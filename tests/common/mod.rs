@@ -2,7 +2,9 @@
 
 #![allow(dead_code, reason = "each test file uses a part of this")]
 
+pub mod comparison;
 pub mod images;
+pub mod random;
 pub mod scenes;
 pub mod statistics;
 pub mod units;

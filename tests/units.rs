@@ -1,0 +1,611 @@
+//! Each concept of the kernels against the reference, over ordinary and extreme inputs.
+
+mod common;
+
+use common::comparison::{Comparison, Tolerance};
+use common::random::Random;
+use common::scenes::{self, v};
+use common::units::{run, run_variant, variant, vec4};
+use glam::{DMat4, DVec2, DVec3, Vec3};
+use tyndall::gpu::shader::Variant;
+use tyndall::pack::layout::{self, INFINITE_DISTANCE, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_TRIANGLE, Light};
+use tyndall::pack::lights::alias_table;
+use tyndall::reference::{bindings, bsdf, camera, film, light, math, medium, phase, ray, rng, sampler, warp};
+use tyndall::scene::{Geometry, Mesh, Scene, Shape};
+
+/// What each function of the kernels promises. Single precision resolves 6e-8; sine and cosine of drivers have an absolute error of
+/// some 2e-7 (the Vulkan specification allows 2^-11); below 1e-37 drivers may flush to zero.
+const TOLERANCES: &[Tolerance] = &[
+    Tolerance { function: "minus_log_1m", relative: 3e-7, absolute: 0.0 },
+    Tolerance { function: "exp_minus", relative: 3e-7, absolute: 2e-38 },
+    Tolerance { function: "orthonormal_frame", relative: 3e-7, absolute: 0.0 },
+    Tolerance { function: "square_to_sphere", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "square_to_cosine_hemisphere", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "square_to_cone", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "warp densities", relative: 3e-6, absolute: 0.0 },
+    Tolerance { function: "intersect_triangle t", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "intersect_triangle barycentric", relative: 0.0, absolute: 5e-6 },
+    Tolerance { function: "intersect_sphere", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "nearest hit", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "channel_weights", relative: 4e-7, absolute: 0.0 },
+    Tolerance { function: "free_flight", relative: 2e-7, absolute: 0.0 },
+    Tolerance { function: "survival_probability", relative: 6e-7, absolute: 2e-38 },
+    Tolerance { function: "survival_weight", relative: 1e-6, absolute: 0.0 },
+    Tolerance { function: "scatter_weight", relative: 1.5e-6, absolute: 0.0 },
+    Tolerance { function: "1 - cos", relative: 6e-7, absolute: 0.0 },
+    Tolerance { function: "cos", relative: 0.0, absolute: 4e-7 },
+    Tolerance { function: "sin", relative: 6e-7, absolute: 0.0 },
+    Tolerance { function: "henyey_greenstein_from", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "scattered direction", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "eval_henyey_greenstein", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "eval_diffuse", relative: 2e-7, absolute: 0.0 },
+    Tolerance { function: "diffuse_pdf", relative: 2e-7, absolute: 0.0 },
+    Tolerance { function: "light direction", relative: 3e-6, absolute: 0.0 },
+    Tolerance { function: "light distance", relative: 3e-6, absolute: 0.0 },
+    Tolerance { function: "sphere light distance", relative: 4e-4, absolute: 0.0 },
+    Tolerance { function: "light weight", relative: 4e-6, absolute: 0.0 },
+    Tolerance { function: "light pdf", relative: 4e-6, absolute: 0.0 },
+    Tolerance { function: "alias rescaled", relative: 0.0, absolute: 1e-5 },
+    Tolerance { function: "camera_direction", relative: 3e-7, absolute: 0.0 },
+];
+
+fn comparison(function: &str) -> Comparison {
+    Comparison::new(TOLERANCES, function)
+}
+
+/// The numbers k/2²⁴ that matter most: both ends, powers of two, and some in between.
+fn units_in_question() -> Vec<f64> {
+    let last = (1u32 << 24) - 1;
+    let mut numbers: Vec<u32> = (0..300).chain(last - 300..=last).collect();
+    numbers.extend((0..24).flat_map(|bit| [(1 << bit) - 1, 1 << bit, last - (1 << bit)]));
+    let mut random = Random(1);
+    numbers.extend((0..4000).map(|_| random.bits() as u32 >> 8));
+    numbers.into_iter().map(|k| f64::from(k) / 16_777_216.0).collect()
+}
+
+fn narrow(vector: DVec3) -> [f32; 3] {
+    vector.as_vec3().to_array()
+}
+
+fn widen(numbers: &[f32]) -> DVec3 {
+    Vec3::from_slice(numbers).as_dvec3()
+}
+
+#[test]
+fn random_numbers_agree_to_the_last_bit() {
+    let mut random = Random(2);
+    let mut inputs: Vec<[u32; 4]> = (0..5000).map(|_| [0; 4].map(|_: u32| random.bits() as u32)).collect();
+    inputs.extend([[0; 4], [u32::MAX; 4], [1, 0, 0, 0], [0, 0, 0, 1]]);
+    let outputs: Vec<[u32; 4]> = run("rng", &inputs, &[], inputs.len(), 2 * inputs.len());
+    for (input, output) in inputs.iter().zip(outputs.chunks(2)) {
+        assert_eq!(output[0], rng::pcg4d(*input), "pcg4d({input:?})");
+        let numbers = rng::to_unit(*input).to_array();
+        assert_eq!(output[1].map(f32::from_bits).map(f64::from), numbers, "to_unit({input:?})");
+        assert!(numbers.iter().all(|number| (0.0..1.0).contains(number)));
+        assert_ne!(output[0], rng::pcg4d([input[0] ^ 1, input[1], input[2], input[3]]), "a bit of the input is lost");
+    }
+}
+
+#[test]
+fn sets_of_the_sampler_agree_to_the_last_bit() {
+    let mut random = Random(3);
+    let mut inputs = Vec::new();
+    for _ in 0..5000 {
+        let bits = (random.bits() % 33) as u32;
+        let mask = u64::pow(2, bits) as u32;
+        let set = (random.bits() % 12) as u32;
+        inputs.push([random.bits() as u32, random.bits() as u32, set, random.bits() as u32 >> (random.bits() % 32)]);
+        inputs.push([bits, mask.wrapping_sub(1), 0, 0]);
+    }
+    let outputs: Vec<[u32; 4]> = run("sampler", &inputs, &[], inputs.len() / 2, inputs.len() / 2);
+    for (input, output) in inputs.chunks(2).zip(outputs) {
+        let ([seed, pixel, set, index], [bits, mask, ..]) = (input[0], input[1]);
+        let expected = sampler::sample_set(seed, pixel, set, index, bits, mask).to_array();
+        assert_eq!(output.map(f32::from_bits).map(f64::from), expected, "{input:?}");
+        let neighbour = sampler::sample_set(seed, pixel ^ 1, set, index, bits, mask).to_array();
+        assert_ne!(output.map(f32::from_bits).map(f64::from), neighbour, "pixels share their numbers");
+    }
+}
+
+#[test]
+fn elementary_functions() {
+    let mut random = Random(4);
+    let mut inputs = Vec::new();
+    let extremes = [0.0, 1e-30, 86.9, 87.0, 87.4, 88.0, 200.0, 1e9, 1e30, f64::INFINITY];
+    for (k, u) in units_in_question().into_iter().enumerate() {
+        let x = if k < extremes.len() { extremes[k] } else { random.log_between(1e-12, 87.0) };
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Z, v(1e-4, 0.0, -1.0), v(0.0, 1e-20, -1.0)];
+        let n = if k < axes.len() { axes[k] } else { random.direction() };
+        inputs.extend([vec4(&[u, x]), vec4(&n.to_array())]);
+    }
+    let outputs: Vec<[f32; 4]> = run("math", &inputs, &[], inputs.len() / 2, inputs.len() / 2 * 3);
+    let mut log = comparison("minus_log_1m");
+    let mut exp = comparison("exp_minus");
+    let mut frame = comparison("orthonormal_frame");
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
+        let [u, x] = [input[0][0], input[0][1]].map(f64::from);
+        log.scalar(u, output[0][0], math::minus_log_1m(u));
+        // What lies below the smallest normal number is 0.
+        exp.scalar(x, output[0][1], math::exp_minus(x));
+        let n = widen(&input[1][..3]);
+        let (tangent, bitangent) = math::orthonormal_frame(n);
+        frame.vector(n, &output[1][..3], tangent);
+        frame.vector(n, &output[2][..3], bitangent);
+        assert!((tangent.cross(bitangent) - n).length() < 1e-6, "the frame of {n} is not right-handed");
+    }
+    log.finish();
+    exp.finish();
+    frame.finish();
+}
+
+#[test]
+fn warps() {
+    let mut random = Random(5);
+    let inputs: Vec<[f32; 4]> =
+        units_in_question().into_iter().map(|u| vec4(&[u, random.unit(), random.log_between(1e-12, 2.0)])).collect();
+    let outputs: Vec<[f32; 4]> = run("warp", &inputs, &[], inputs.len(), 3 * inputs.len());
+    let names = ["square_to_sphere", "square_to_cosine_hemisphere", "square_to_cone"];
+    let mut directions = names.map(comparison);
+    let mut densities = comparison("warp densities");
+    for (input, output) in inputs.iter().zip(outputs.chunks(3)) {
+        let [x, y, m, _] = input.map(f64::from);
+        let u = DVec2::new(x, y);
+        let expected = [warp::square_to_sphere(u), warp::square_to_cosine_hemisphere(u), warp::square_to_cone(u, m)];
+        let pdfs = [
+            warp::square_to_sphere_pdf(),
+            warp::square_to_cosine_hemisphere_pdf(f64::from(output[1][2])),
+            warp::square_to_cone_pdf(m),
+        ];
+        for k in 0..3 {
+            directions[k].vector(format!("{x}, {y}, {m}"), &output[k][..3], expected[k]);
+            densities.scalar(format!("{} {x}, {y}, {m}", names[k]), output[k][3], pdfs[k]);
+        }
+    }
+    directions.into_iter().for_each(Comparison::finish);
+    densities.finish();
+}
+
+#[test]
+fn rays_meet_triangles_and_spheres() {
+    let mut random = Random(6);
+    let mut inputs = Vec::new();
+    for k in 0..6000 {
+        // Of any size, anywhere; some are needles.
+        let scale = random.log_between(1e-6, 1e6);
+        let thin = if k % 5 == 0 { 1e-3 } else { 1.0 };
+        let [a, b] = [random.in_cube() * scale, random.in_cube() * scale];
+        let c = a + (b - a) * 0.4 + random.in_cube() * scale * thin;
+        let [a, b, c] = [a, b, c].map(|p| p.as_vec3().as_dvec3());
+        let origin = (random.in_cube() * scale * 3.0).as_vec3().as_dvec3();
+        let target = if k % 2 == 0 { a * 0.3 + b * 0.3 + c * 0.4 } else { random.in_cube() * scale };
+        let direction = (target - origin).normalize();
+        let (center, radius) = (random.in_cube() * scale, random.between(0.1, 1.0) * scale);
+        inputs.extend([vec4(&origin.to_array()), vec4(&direction.to_array())]);
+        inputs.extend([a, b, c].map(|p| vec4(&p.to_array())));
+        inputs.push(vec4(&[center.x, center.y, center.z, radius]));
+    }
+    let count = inputs.len() / 6;
+    let outputs: Vec<[f32; 4]> = run("ray", &inputs, &[], count, 2 * count);
+    let mut t = comparison("intersect_triangle t");
+    let mut barycentric = comparison("intersect_triangle barycentric");
+    let mut sphere = comparison("intersect_sphere");
+    let (mut hits, mut close) = (0, 0);
+    for (input, output) in inputs.chunks(6).zip(outputs.chunks(2)) {
+        let [origin, direction, a, b, c] = [0, 1, 2, 3, 4].map(|k| widen(&input[k][..3]));
+        let seen = ray::Ray::new(origin, direction);
+        let hit = ray::intersect_triangle(&seen, a, b, c);
+        // Rounding decides what lies within it of an edge, and what is seen from the side.
+        let size = (b - a).length().max((c - a).length());
+        let reach = (a - origin).length() + size;
+        let normal = (b - a).cross(c - a);
+        let height = normal.length() / size;
+        let grazing = normal.normalize().dot(direction).abs();
+        let DVec2 { x, y } = hit.barycentric;
+        let inside = x.min(y).min(1.0 - x - y);
+        if inside.abs() * height * grazing < 1e-5 * reach {
+            close += 1;
+        } else {
+            assert_eq!(output[0][0] == 1.0, hit.hit, "{input:?}");
+            if hit.hit {
+                hits += 1;
+                assert_eq!(output[0][1] == 1.0, hit.along_normal, "{input:?}");
+                // Well seen: the error of the distance grows with the slant and with how thin the triangle is.
+                if height * grazing > 0.05 * reach {
+                    t.scalar(format!("{input:?}"), output[0][2], hit.t);
+                    barycentric.scalar(format!("{input:?}"), output[1][0], x);
+                    barycentric.scalar(format!("{input:?}"), output[1][1], y);
+                }
+            }
+        }
+        let (center, radius) = (widen(&input[5][..3]), f64::from(input[5][3]));
+        let ends = ray::intersect_sphere(&seen, center, radius);
+        // Where the ray passes at less than .95 of the radius; near the rim the distance has half the digits.
+        if ends.y - ends.x > 0.6 * radius && ends.x.abs().min(ends.y.abs()) > 0.05 * ends.x.abs().max(ends.y.abs()) {
+            sphere.scalar(format!("{input:?}"), output[1][2], ends.x);
+            sphere.scalar(format!("{input:?}"), output[1][3], ends.y);
+        }
+    }
+    assert!(hits > 1000 && close < count / 5, "{hits} hits, {close} of {count} are too close to call");
+    t.finish();
+    barycentric.finish();
+    sphere.finish();
+}
+
+#[test]
+fn a_grazing_ray_meets_a_sphere_near_where_it_should() {
+    // The ray passes at (1 − d) R: half the chord is R √(2 d − d²), for d down to the resolution of single precision.
+    let mut inputs = Vec::new();
+    let distances: Vec<f64> = (1..=23).map(|k| f64::powi(0.5, k)).collect();
+    for d in &distances {
+        inputs.extend([vec4(&[1.0 - d, 0.0, -2.0]), vec4(&[0.0, 0.0, 1.0])]);
+        inputs.extend([[0.0; 4], [0.0; 4], [0.0; 4], vec4(&[0.0, 0.0, 0.0, 1.0])]);
+    }
+    let outputs: Vec<[f32; 4]> = run("ray", &inputs, &[], distances.len(), 2 * distances.len());
+    let mut sphere = comparison("intersect_sphere");
+    for (d, output) in distances.iter().zip(outputs.chunks(2)) {
+        let half = (d * (2.0 - d)).sqrt();
+        sphere.scalar(d, output[1][2], 2.0 - half);
+        sphere.scalar(d, output[1][3], 2.0 + half);
+    }
+    sphere.finish();
+}
+
+/// The tables of a closed mesh, and rays that a walk through it should answer.
+struct Walks {
+    packed: tyndall::pack::Packed,
+    /// Origin, direction; in the coordinates of the tables.
+    rays: Vec<[DVec3; 2]>,
+    /// From inside or from outside?
+    inside: Vec<bool>,
+}
+
+impl Walks {
+    /// Rays in general position, and rays exactly through corners and edges, from outside and from the centre.
+    fn new(mesh: Mesh, seed: u64) -> Walks {
+        let mut scene: Scene = scenes::gray_box();
+        scene.shapes = vec![Shape::diffuse("mesh", Geometry::Mesh(mesh), DVec3::ONE)];
+        let packed = scenes::pack(&scene, 1, 1);
+        let mut random = Random(seed);
+        let (mut rays, mut inside) = (Vec::new(), Vec::new());
+        let mut add = |origin: DVec3, direction: DVec3, from_inside| {
+            rays.push([origin.as_vec3().as_dvec3(), direction.as_vec3().as_dvec3()]);
+            inside.push(from_inside);
+        };
+        for _ in 0..3000 {
+            let origin = random.direction() * 3.0;
+            add(origin, (random.in_cube() - origin).normalize(), false);
+            add(DVec3::ZERO, random.direction(), true);
+        }
+        for primitive in &packed.primitives {
+            let [a, b, c] = [primitive.a, primitive.b, primitive.c].map(|p| p.as_dvec3());
+            for target in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0] {
+                let origin = random.direction() * 3.0;
+                add(origin, (target - origin).normalize(), false);
+                add(DVec3::ZERO, target.normalize(), true);
+                add(target * 3.0, -target.normalize(), false);
+                // Along an axis the projection is exact, so the edge function of a corner or a middle is exactly 0.
+                for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                    add(target - axis * (4.0 + target.dot(axis)), axis, false);
+                    add(target + axis * (4.0 - target.dot(axis)), -axis, false);
+                }
+            }
+        }
+        Walks { packed, rays, inside }
+    }
+
+    fn run(&self, variant: &Variant) -> Vec<[f32; 4]> {
+        let rays = self.rays.iter();
+        let inputs: Vec<[f32; 4]> =
+            rays.flat_map(|[o, d]| [vec4(&[o.x, o.y, o.z, 100.0]), vec4(&d.to_array())]).collect();
+        let tables: [&[u8]; 3] = [
+            bytemuck::cast_slice(&self.packed.bvh.nodes),
+            bytemuck::cast_slice(&self.packed.primitives),
+            bytemuck::bytes_of(&self.packed.params),
+        ];
+        run_variant("bvh", variant, &inputs, &tables, self.rays.len(), self.rays.len())
+    }
+}
+
+/// Counts rays that leave a closed mesh other than they should: as often as they enter it, once more if they begin inside.
+fn leaks(outputs: &[[f32; 4]], inside: &[bool]) -> usize {
+    let right = |(output, inside): (&[f32; 4], &bool)| output[3] == if *inside { 1.0 } else { 0.0 };
+    outputs.iter().zip(inside).filter(|pair| !right(*pair)).count()
+}
+
+fn octahedron() -> Mesh {
+    let positions = vec![DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
+    let mut triangles = Vec::new();
+    for (x, y, z) in [(0, 2, 4), (0, 2, 5), (0, 3, 4), (0, 3, 5), (1, 2, 4), (1, 2, 5), (1, 3, 4), (1, 3, 5)] {
+        let even = (x % 2 + y % 2 + z % 2) % 2 == 0;
+        triangles.push(if even { [x, y, z] } else { [x, z, y] });
+    }
+    Mesh { positions, triangles }
+}
+
+#[test]
+fn walks_find_the_nearest_triangle_and_never_leak() {
+    let Geometry::Mesh(cube) = scenes::cuboid(DMat4::IDENTITY) else { unreachable!("a cuboid is a mesh") };
+    for (name, mesh) in [("cube", cube), ("octahedron", octahedron()), ("icosphere", scenes::icosphere(3))] {
+        let walks = Walks::new(mesh, 7);
+        let outputs = walks.run(&variant());
+        let mut nearest = comparison("nearest hit");
+        for ([origin, direction], output) in walks.rays.iter().zip(&outputs) {
+            // By trying all triangles, in double precision.
+            let seen = ray::Ray::new(*origin, *direction);
+            let hits = walks.packed.primitives.iter().filter_map(|primitive| {
+                let [a, b, c] = [primitive.a, primitive.b, primitive.c].map(|p| p.as_dvec3());
+                let hit = ray::intersect_triangle(&seen, a, b, c);
+                let normal = (b - a).cross(c - a).normalize();
+                (hit.hit && hit.t > 0.0).then_some((hit.t, normal.dot(*direction).abs()))
+            });
+            // A ray near a rim hits or misses, and near an edge hits one or the other side, by rounding; neighbours differ by
+            // up to .2 in their cosine, and the distance to one that is seen from the side has fewer digits.
+            if let Some((t, cosine)) = hits.min_by(|one, two| one.0.total_cmp(&two.0))
+                && cosine > 0.3
+                && output[1].to_bits() != u32::MAX
+                && (f64::from(output[0]) - t).abs() < 0.1
+            {
+                nearest.scalar(format!("{origin}, {direction}"), output[0], t);
+            } else {
+                assert!(output[2] % 2.0 == 0.0 || *origin == DVec3::ZERO);
+            }
+        }
+        nearest.finish();
+        let leaks = leaks(&outputs, &walks.inside);
+        assert_eq!(leaks, 0, "{name}: rays leak, of {}", outputs.len());
+    }
+}
+
+#[test]
+fn the_tree_misses_nothing_in_either_layout() {
+    let walks = Walks::new(scenes::icosphere(3), 8);
+    let eight = walks.run(&variant());
+    // The first of the eight copies alone, and the same with the kernel that turns it by the ray's direction.
+    let mut single = walks.packed.clone();
+    single.bvh.nodes.truncate(single.bvh.node_count as usize);
+    let mut features = variant().features;
+    features.node_copies = 1;
+    let one = Walks { packed: single, ..Walks::new(scenes::icosphere(3), 8) }.run(&Variant { features, ..variant() });
+    for (a, b) in eight.iter().zip(&one) {
+        assert_eq!((a[0], a[2], a[3]), (b[0], b[2], b[3]));
+    }
+    // Without a hole there is no leak, with one there is: the counter is not blind.
+    let mut open = scenes::icosphere(3);
+    open.triangles.truncate(open.triangles.len() - 5);
+    let open = Walks::new(open, 8);
+    assert!(leaks(&open.run(&variant()), &open.inside) > 0, "a mesh with holes must leak");
+}
+
+#[test]
+fn media() {
+    let mut random = Random(9);
+    let mut inputs = Vec::new();
+    for (k, u) in units_in_question().into_iter().enumerate() {
+        let depth = random.log_between(1e-12, 1e8);
+        let throughput =
+            v(random.log_between(1e-6, 10.0), random.log_between(1e-6, 10.0), random.log_between(1e-6, 10.0));
+        // The channel that the flight was sampled in has a depth below 17; the others have any.
+        let deep = [random.log_between(1e-12, 16.6), random.log_between(1e-12, 1e8), random.log_between(1e-12, 1e8)];
+        let tau = [0, 1, 2].map(|channel| deep[(channel + k) % 3]);
+        let sigma = [0; 3].map(|_| if random.unit() < 0.1 { 0.0 } else { random.log_between(1e-6, 1e6) });
+        let sigma = if sigma[(3 - k % 3) % 3] == 0.0 { [1.0; 3] } else { sigma };
+        let albedo = [random.unit(), random.unit(), 1.0];
+        inputs.push(vec4(&[u, math::minus_log_1m(u), if k % 50 == 0 { 0.0 } else { depth }]));
+        inputs.extend([vec4(&throughput.to_array()), vec4(&tau), vec4(&sigma), vec4(&albedo)]);
+    }
+    let count = inputs.len() / 5;
+    let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], count, 4 * count);
+    let names = ["channel_weights", "free_flight", "survival_probability", "survival_weight", "scatter_weight"];
+    let [mut weights, mut flight, mut probability, mut survival, mut scatter] = names.map(comparison);
+    for (input, output) in inputs.chunks(5).zip(outputs.chunks(4)) {
+        let [u, tau_one, sigma_one, _] = input[0].map(f64::from);
+        let [throughput, tau, sigma_t, albedo] = [1, 2, 3, 4].map(|k| widen(&input[k][..3]));
+        let expected = medium::channel_weights(throughput);
+        let case = format!("{input:?}");
+        // Where u lies at the very border of two channels, either is right.
+        let border = [expected.x, expected.x + expected.y].iter().any(|edge| (u - edge).abs() < 1e-6);
+        assert!(border || f64::from(output[0][0]) == f64::from(medium::sample_channel(expected, u)), "{case}");
+        flight.scalar(&case, output[0][1], medium::free_flight(tau_one, sigma_one));
+        probability.scalar(&case, output[0][2], medium::survival_probability(expected, tau));
+        weights.vector(&case, &output[1][..3], expected);
+        survival.vector(&case, &output[2][..3], medium::survival_weight(expected, tau));
+        scatter.vector(&case, &output[3][..3], medium::scatter_weight(expected, tau, sigma_t, albedo));
+    }
+    assert!(outputs.iter().flatten().all(|number| number.abs() <= INFINITE_DISTANCE), "a weight is not finite");
+    [weights, flight, probability, survival, scatter].into_iter().for_each(Comparison::finish);
+}
+
+#[test]
+fn phase_functions() {
+    let mut random = Random(10);
+    let mut inputs = Vec::new();
+    let magnitudes = [1e-8, 1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 0.5, 0.75, 0.9, 0.99, 0.999, 0.9999, 0.99999, 1.0 - 1e-6];
+    for g in magnitudes.into_iter().flat_map(|g| [g, -g]).chain([0.0]) {
+        for u in units_in_question().into_iter().step_by(3) {
+            inputs.extend([vec4(&[g, u, random.unit()]), vec4(&random.direction().to_array())]);
+        }
+    }
+    let count = inputs.len() / 2;
+    let outputs: Vec<[f32; 4]> = run("phase", &inputs, &[], count, 2 * count);
+    let names = ["1 - cos", "cos", "sin", "henyey_greenstein_from", "scattered direction", "eval_henyey_greenstein"];
+    let mut functions = names.map(comparison);
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(2)) {
+        let [g, u, turn, _] = input[0].map(f64::from);
+        let before = widen(&input[1][..3]);
+        let case = format!("g = {g}, u = {u}");
+        let angle = phase::sample_henyey_greenstein(g, u);
+        functions[0].scalar(&case, output[0][0], angle.one_minus_cos);
+        functions[1].scalar(&case, output[0][1], angle.cos_theta);
+        functions[2].scalar(&case, output[0][2], angle.sin_theta);
+        functions[3].scalar(&case, output[0][3], phase::henyey_greenstein_from(g, angle.one_minus_cos));
+        let local = warp::from_polar(angle.cos_theta, angle.sin_theta, turn);
+        functions[4].vector(&case, &output[1][..3], math::from_frame(before, local));
+        // Of the direction that the kernel found: rounding it is not an error of the function.
+        let after = widen(&output[1][..3]);
+        functions[5].scalar(&case, output[1][3], phase::eval_henyey_greenstein(g, before, after));
+    }
+    functions.into_iter().for_each(Comparison::finish);
+}
+
+#[test]
+fn surfaces() {
+    let mut random = Random(11);
+    let mut inputs: Vec<[f32; 4]> = vec![vec4(&[0.0, 1.0, -1.0, 1e-30])];
+    inputs.extend((0..500).map(|_| [0.0; 4].map(|_: f32| random.between(-1.0, 1.0) as f32)));
+    let outputs: Vec<[f32; 4]> = run("bsdf", &inputs, &[], inputs.len(), 2 * inputs.len());
+    let [mut eval, mut pdf] = ["eval_diffuse", "diffuse_pdf"].map(comparison);
+    for (input, output) in inputs.iter().zip(outputs.chunks(2)) {
+        for k in 0..4 {
+            let cosine = f64::from(input[k]);
+            eval.scalar(cosine, output[0][k], bsdf::eval_diffuse(cosine));
+            pdf.scalar(cosine, output[1][k], bsdf::diffuse_pdf(cosine));
+        }
+    }
+    eval.finish();
+    pdf.finish();
+}
+
+/// One light of each kind, near the origin.
+fn lights() -> Vec<Light> {
+    let plane = |kind, normal: Vec3, area| Light {
+        origin: Vec3::new(-0.3, 0.9, -0.2),
+        kind,
+        edge_1: Vec3::new(0.6, 0.0, 0.0),
+        edge_2: Vec3::new(0.1, 0.0, 0.5),
+        area,
+        normal,
+        radiance: Vec3::new(3.0, 2.0, 1.0),
+        ..Light::default()
+    };
+    let sphere = |center: Vec3, radius, side| Light {
+        origin: center,
+        kind: LIGHT_SPHERE,
+        edge_1: Vec3::new(radius, side, 0.0),
+        radiance: Vec3::new(1.0, 5.0, 0.0),
+        ..Light::default()
+    };
+    let point = Light { kind: LIGHT_POINT, origin: Vec3::new(0.1, 0.7, 0.2), radiance: Vec3::ONE, ..Light::default() };
+    let mut lights = vec![
+        plane(LIGHT_TRIANGLE, Vec3::NEG_Y, 0.15),
+        plane(LIGHT_QUAD, Vec3::NEG_Y, 0.3),
+        sphere(Vec3::new(0.2, 0.8, -0.1), 0.3, 1.0),
+        sphere(Vec3::ZERO, 4.0, -1.0),
+        sphere(Vec3::new(0.5, 0.5, 0.5), 1e-3, 1.0),
+        point,
+    ];
+    let table = alias_table(&[0.3, 0.2, 0.25, 0.05, 0.01, 0.19]);
+    for (light, (threshold, alias)) in lights.iter_mut().zip(table) {
+        light.alias_threshold = threshold as f32;
+        light.alias = alias;
+    }
+    lights
+}
+
+#[test]
+fn light_sources() {
+    let lights = lights();
+    let wide: Vec<bindings::Light> = lights.iter().map(bindings::Light::from).collect();
+    let mut random = Random(12);
+    let mut inputs = Vec::new();
+    for u in units_in_question() {
+        for index in 0..lights.len() {
+            let p = random.in_cube() * 2.0;
+            inputs.extend([vec4(&[p.x, p.y, p.z, random.unit()]), vec4(&[u, index as f64])]);
+        }
+    }
+    let count = inputs.len() / 2;
+    let outputs: Vec<[f32; 4]> = run("light", &inputs, &[bytemuck::cast_slice(&lights)], count, 3 * count);
+    let names =
+        ["light direction", "light distance", "sphere light distance", "light weight", "light pdf", "alias rescaled"];
+    let [mut direction, mut distance, mut sphere_distance, mut weight, mut pdf, mut rescaled] = names.map(comparison);
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
+        let point = widen(&input[0][..3]);
+        let u = DVec2::new(f64::from(input[1][0]), f64::from(input[0][3]));
+        let index = input[1][1] as usize;
+        let light = &wide[index];
+        let case = format!("light {index}, {input:?}");
+        let (found, asked) = match light.kind {
+            LIGHT_POINT => (light::sample_point_light(light, point), 0.0),
+            LIGHT_SPHERE => {
+                let asked = light::sphere_light_pdf(light.edge_1.x, point.distance(light.origin));
+                (light::sample_sphere_light(light, point, u), asked)
+            }
+            _ => {
+                let found = light::sample_plane_light(light, point, u);
+                let cosine = -found.direction.dot(light.normal);
+                (found, light::area_pdf(light.area, found.distance, cosine))
+            }
+        };
+        // A plane light seen edge-on has no digits left in its cosine; a sphere's surface is where inside becomes outside.
+        let edge_on = light.kind <= LIGHT_QUAD && found.direction.dot(light.normal).abs() < 0.02;
+        let border = light.kind == LIGHT_SPHERE && (point.distance(light.origin) / light.edge_1.x - 1.0).abs() < 1e-3;
+        if !border && !edge_on {
+            direction.vector(&case, &output[0][..3], found.direction);
+            if light.kind == LIGHT_SPHERE {
+                // The rim of a sphere that covers little of the view is lost to rounding of the direction.
+                if light.edge_1.x > 0.1 {
+                    sphere_distance.scalar(&case, output[0][3], found.distance);
+                }
+            } else {
+                distance.scalar(&case, output[0][3], found.distance);
+            }
+            weight.vector(&case, &output[1][..3], found.weight);
+            pdf.scalar(&case, output[1][3], found.pdf);
+            if asked.is_finite() {
+                pdf.scalar(&case, output[2][0], asked);
+            }
+        }
+        let mut rest = u.x;
+        let line = light::alias_line(lights.len() as u32, &mut rest);
+        let threshold = wide[line as usize].alias_threshold;
+        let border = (rest - threshold).abs() < 1e-6;
+        assert_eq!(output[2][1] as u32, line, "{case}");
+        if !border {
+            let keeps = light::alias_keeps(threshold, &mut rest);
+            assert_eq!(output[2][3] == 1.0, keeps, "{case}");
+            rescaled.scalar(&case, output[2][2], rest);
+        }
+        assert!((0.0..1.0).contains(&output[2][2]), "{case}: the rescaled number is {}", output[2][2]);
+    }
+    [direction, distance, sphere_distance, weight, pdf, rescaled].into_iter().for_each(Comparison::finish);
+}
+
+#[test]
+fn cameras() {
+    let mut random = Random(13);
+    let mut inputs = Vec::new();
+    for _ in 0..1000 {
+        let [corner, right, down] = [0; 3].map(|_| narrow(random.in_cube()).map(f64::from));
+        inputs.extend([corner, right, down].map(|vector| vec4(&vector)));
+        inputs.push(vec4(&[random.unit(), random.unit()]));
+    }
+    let count = inputs.len() / 4;
+    let outputs: Vec<[f32; 4]> = run("camera", &inputs, &[], count, count);
+    let mut direction = comparison("camera_direction");
+    for (input, output) in inputs.chunks(4).zip(&outputs) {
+        let [corner, right, down] = [0, 1, 2].map(|k| widen(&input[k][..3]));
+        let film = DVec2::new(f64::from(input[3][0]), f64::from(input[3][1]));
+        let expected = camera::camera_direction(corner, right, down, film);
+        // Relative to the vectors that are added, which may cancel.
+        if expected.length() > 0.5 {
+            direction.vector(format!("{input:?}"), &output[..3], expected);
+        }
+    }
+    direction.finish();
+}
+
+#[test]
+fn tiles_cover_the_crop_window_once() {
+    let (width, height) = (29u32, 17u32);
+    let tiles = width.div_ceil(layout::TILE) * height.div_ceil(layout::TILE);
+    let pixels = layout::TILE * layout::TILE;
+    let inputs: Vec<[u32; 4]> = (0..tiles * pixels).map(|slot| [slot / pixels, slot % pixels, width, 0]).collect();
+    let outputs: Vec<[u32; 4]> = run("film", &inputs, &[], inputs.len(), inputs.len());
+    let mut seen = std::collections::HashSet::new();
+    for (input, output) in inputs.iter().zip(&outputs) {
+        assert_eq!(film::tile_pixel(input[0], input[1], input[2]), output[..2], "{input:?}");
+        assert!(seen.insert(*output), "{output:?} is covered twice");
+    }
+    let inside = seen.iter().filter(|[x, y, ..]| *x < width && *y < height).count();
+    assert_eq!(inside, (width * height) as usize);
+}
