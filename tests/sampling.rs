@@ -4,7 +4,7 @@ mod common;
 
 use common::random::Random;
 use common::scenes::v;
-use common::statistics::check_uniform;
+use common::statistics::{check_uniform, chi_squared_tail, sidak_bound, student_tails};
 use common::truth;
 use common::units::{run, vec4};
 use glam::{DVec3, Vec3};
@@ -422,4 +422,18 @@ fn sets_and_pixels_are_independent_of_each_other() {
     }
     let same = outputs.chunks(2).map(|pair| ((number(pair[0][0]) * 10.0).floor() + number(pair[0][0])) / 10.0);
     check_uniform(same, 100).expect_err("a number is not independent of itself");
+}
+
+#[test]
+fn the_tests_statistics_agree_with_printed_tables() {
+    // Abramowitz and Stegun, tables 26.8 and 26.10.
+    for (x, freedom, probability) in
+        [(18.307, 10.0, 0.05), (3.841, 1.0, 0.05), (29.588, 10.0, 0.001), (3.940, 10.0, 0.95)]
+    {
+        assert!((chi_squared_tail(x, freedom) / probability - 1.0).abs() < 1e-3, "chi² = {x}");
+    }
+    for (t, freedom, probability) in [(2.228, 10.0, 0.05), (2.0, 60.0, 0.05), (3.460, 60.0, 0.001)] {
+        assert!((student_tails(t, freedom) / probability - 1.0).abs() < 5e-3, "t = {t}");
+    }
+    assert!((sidak_bound(30, 63.0) - 4.5).abs() < 0.05);
 }

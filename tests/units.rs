@@ -250,6 +250,9 @@ fn a_grazing_ray_meets_a_sphere_near_where_it_should() {
     sphere.finish();
 }
 
+/// Rays in general position, before those through corners and edges, which may pass by an edge of the outline.
+const GENERAL: usize = 6000;
+
 /// The tables of a closed mesh, and rays that a walk through it should answer.
 struct Walks {
     packed: tyndall::pack::Packed,
@@ -271,7 +274,7 @@ impl Walks {
             rays.push([origin.as_vec3().as_dvec3(), direction.as_vec3().as_dvec3()]);
             inside.push(from_inside);
         };
-        for _ in 0..3000 {
+        for _ in 0..GENERAL / 2 {
             let origin = random.direction() * 3.0;
             add(origin, (random.in_cube() - origin).normalize(), false);
             add(DVec3::ZERO, random.direction(), true);
@@ -329,7 +332,7 @@ fn walks_find_the_nearest_triangle_and_never_leak() {
         let walks = Walks::new(mesh, 7);
         let outputs = walks.run(&variant());
         let mut nearest = comparison("nearest hit");
-        for ([origin, direction], output) in walks.rays.iter().zip(&outputs) {
+        for (k, ([origin, direction], output)) in walks.rays.iter().zip(&outputs).enumerate() {
             // By trying all triangles, in double precision.
             let seen = ray::Ray::new(*origin, *direction);
             let hits = walks.packed.primitives.iter().filter_map(|primitive| {
@@ -342,12 +345,9 @@ fn walks_find_the_nearest_triangle_and_never_leak() {
             // up to .2 in their cosine, and the distance to one that is seen from the side has fewer digits.
             if let Some((t, cosine)) = hits.min_by(|one, two| one.0.total_cmp(&two.0))
                 && cosine > 0.3
-                && output[1].to_bits() != u32::MAX
-                && (f64::from(output[0]) - t).abs() < 0.1
+                && (k < GENERAL || output[1].to_bits() != u32::MAX)
             {
                 nearest.scalar(format!("{origin}, {direction}"), output[0], t);
-            } else {
-                assert!(output[2] % 2.0 == 0.0 || *origin == DVec3::ZERO);
             }
         }
         nearest.finish();
