@@ -208,8 +208,8 @@ fn both_forms_of_every_kernel_render_the_same_image() {
     for (name, scene) in scenes::all() {
         let packed = scenes::pack(&scene, 3, 16);
         let mut forms = vec![(packed.clone(), packed.features)];
-        // Compiling takes longer than rendering: one scene stands for the kernels that can do everything, one for trees too
-        // large for eight copies.
+        // Compiling takes longer than rendering: one scene stands for the kernels that can do everything, one for trees
+        // too large for eight copies.
         if name == "nested media" {
             forms.push((packed.clone(), packed.features.everything()));
         }

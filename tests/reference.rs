@@ -47,8 +47,9 @@ fn the_comparison_rejects_a_brighter_image_and_the_wrong_sign_of_g() {
     images::compare(&right, &images::by_reference(&flipped, 16)).expect_err("scattering in the wrong direction");
 }
 
-/// Batches of an estimate, and the z-value of their mean under the hypothesis that the expectation is `expected`, which is known to
-/// `error`. The standard error must be below a seventh of `resolution`, so that a bias of that size would be seen.
+/// Batches of an estimate, and the z-value of their mean under the hypothesis that the expectation is `expected`, which
+/// is known to `error`. The standard error must be below a seventh of `resolution`, so that a bias of that size would
+/// be seen.
 fn z_value(batches: &[f64], expected: f64, error: f64, resolution: f64) -> Result<f64, String> {
     let (mean, deviation) = mean_and_error(batches);
     if deviation > resolution / 7.0 {
@@ -180,8 +181,8 @@ fn check_channels(found: DVec3, expected: DVec3, tolerance: DVec3) -> Result<(),
 
 #[test]
 fn absorption_follows_the_law_of_beer_and_lambert_along_shadow_rays() {
-    // A point of a floor, lit by a point light above, through the medium: the shadow ray's transmittance is no estimate, so each sample is
-    // rho/pi I/r² T.
+    // A point of a floor, lit by a point light above, through the medium: the shadow ray's transmittance is no
+    // estimate, so each sample is rho/pi I/r² T.
     for row in truth::table("C") {
         let length = row.number("d");
         let (transmittance, _) = row.output("T");
@@ -208,8 +209,8 @@ fn absorption_follows_the_law_of_beer_and_lambert_along_shadow_rays() {
 
 #[test]
 fn absorption_follows_the_law_of_beer_and_lambert_along_camera_rays() {
-    // Whether a camera ray gets through is sampled; its flight and channel are Sobol numbers, so 2^16 samples of one pixel
-    // resolve the transmittance far better than 2^-8.
+    // Whether a camera ray gets through is sampled; its flight and channel are Sobol numbers, so 2^16 samples of one
+    // pixel resolve the transmittance far better than 2^-8.
     let spp = 1 << 16;
     for row in truth::table("C") {
         let length = row.number("d");

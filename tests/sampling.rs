@@ -48,7 +48,8 @@ const ASYMMETRIES: [f64; 11] = [0.0, 1e-6, -1e-6, 0.3, -0.3, 0.9, -0.9, 0.999, -
 
 /// Henyey and Greenstein's distribution function of m = 1 − cos (of 1 + cos for g < 0), the integral of their density:
 ///   P(1 − cos ≤ m) = 1 − (1 − a²)/(2 a) (1/√((1 − a)² + 2 a m) − 1/(1 + a)), a = |g|; m/2 for a = 0.
-/// With s = √(…): 1/s − 1/(1 + a) = ((1 + a)² − s²)/(s (1 + a) (1 + a + s)) and (1 + a)² − s² = 2 a (2 − m), which does not cancel.
+/// With s = √(…): 1/s − 1/(1 + a) = ((1 + a)² − s²)/(s (1 + a) (1 + a + s)) and (1 + a)² − s² = 2 a (2 − m), which does
+/// not cancel.
 fn distribution(g: f64, m: f64) -> f64 {
     let a = g.abs();
     let s = ((1.0 - a).powi(2) + 2.0 * a * m).sqrt();
@@ -105,8 +106,8 @@ fn the_mean_cosine_is_g() {
     }
 }
 
-/// Whether a density integrates to 1 over the sphere, from its values at m = 1 − cos in ascending order, by trapezoids: 2π dm is the
-/// solid angle.
+/// Whether a density integrates to 1 over the sphere, from its values at m = 1 − cos in ascending order, by trapezoids:
+/// 2π dm is the solid angle.
 fn check_integral(points: &[(f64, f64)]) -> Result<(), String> {
     let trapezoid = |pair: &[(f64, f64)]| PI * (pair[0].1 + pair[1].1) * (pair[1].0 - pair[0].0);
     let integral = points.windows(2).map(trapezoid).sum::<f64>() + 2.0 * PI * points[0].0 * points[0].1;
@@ -132,8 +133,8 @@ fn densities_integrate_to_one_and_weights_are_one() {
         let brighter: Vec<_> = points.iter().map(|(m, pdf)| (*m, pdf * 1.001)).collect();
         check_integral(&brighter).expect_err("a density that is too large");
         for sample in &samples {
-            // The weight f/pdf of a sample is 1, to what single precision leaves of the direction: an error e of a unit vector
-            // is an error e/sin of the angle, and the density changes with the angle on the scale of 1 - |g|.
+            // The weight f/pdf of a sample is 1, to what single precision leaves of the direction: an error e of a unit
+            // vector is an error e/sin of the angle, and the density changes with the angle on the scale of 1 - |g|.
             let scale = (2.0 * sample.one_minus_cos + (1.0 - g.abs()).powi(2)).sqrt();
             let tolerance = 2e-6 + 6e-7 / scale;
             let weight = sample.eval / sample.pdf;
@@ -242,8 +243,8 @@ fn free_flights_are_exponential() {
     }
 }
 
-/// Irradiance from a polygon of radiance 1, all of it above the horizon: Lambert (1760), E = ½ Σ θ_i n · Γ_i with the angle θ_i under
-/// which an edge is seen and the unit normal Γ_i of the plane through it and the point.
+/// Irradiance from a polygon of radiance 1, all of it above the horizon: Lambert (1760), E = ½ Σ θ_i n · Γ_i with the
+/// angle θ_i under which an edge is seen and the unit normal Γ_i of the plane through it and the point.
 fn lambert(corners: &[DVec3], point: DVec3, normal: DVec3) -> f64 {
     let seen: Vec<DVec3> = corners.iter().map(|corner| (*corner - point).normalize()).collect();
     let edge = |k: usize| {
@@ -359,8 +360,8 @@ fn shapes(total: u32) -> Vec<[u32; 4]> {
     shapes
 }
 
-/// Whether points are as even as Sobol's: each dimension stratified, the first two a (0, m, 2)-net, and all four a (3, m, 4)-net,
-/// 3 being the sum of the degrees less one of the polynomials of dimensions 2 to 4 (Niederreiter 1987).
+/// Whether points are as even as Sobol's: each dimension stratified, the first two a (0, m, 2)-net, and all four a (3,
+/// m, 4)-net, 3 being the sum of the degrees less one of the polynomials of dimensions 2 to 4 (Niederreiter 1987).
 fn check_net(points: &[[f64; 4]]) -> Result<(), String> {
     let m = points.len().ilog2();
     for axis in 0..4 {

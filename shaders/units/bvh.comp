@@ -1,5 +1,6 @@
-// Unit kernel of lib/bvh.glsl: rays (origin, longest distance), (direction, 0) in; of each walk through a tree of triangles
-// (distance to the nearest, its index (bit pattern), crossings in all, crossings along the normal less those against it) out.
+// Unit kernel of lib/bvh.glsl: rays (origin, longest distance), (direction, 0) in; of each walk through a tree of
+// triangles (distance to the nearest, its index (bit pattern), crossings in all, crossings along the normal less those
+// against it) out.
 #version 460
 #include "lib/layout.glsl"
 #include "lib/features.glsl"

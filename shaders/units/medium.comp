@@ -1,5 +1,5 @@
-// Unit kernel of lib/medium.glsl: (u, tau, sigma_t, 0), throughput, tau, sigma_t and albedo (RGB) in; (channel, free flight, survival probability, 0),
-// channel weights, survival weight and scatter weight out.
+// Unit kernel of lib/medium.glsl: (u, tau, sigma_t, 0), throughput, tau, sigma_t and albedo (RGB) in; (channel, free
+// flight, survival probability, 0), channel weights, survival weight and scatter weight out.
 #version 460
 #include "lib/layout.glsl"
 #include "lib/medium.glsl"

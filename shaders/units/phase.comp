@@ -1,5 +1,5 @@
-// Unit kernel of lib/phase.glsl: (g, u, v, 0), (direction before, 0) in; (1 - cos, cos, sin, density at that angle), (direction after, phase function
-// of both directions) out.
+// Unit kernel of lib/phase.glsl: (g, u, v, 0), (direction before, 0) in; (1 - cos, cos, sin, density at that angle),
+// (direction after, phase function of both directions) out.
 #version 460
 #include "lib/math.glsl"
 #include "lib/warp.glsl"

@@ -1,5 +1,5 @@
-// Unit kernel of lib/ray.glsl: a ray (origin, direction), three corners and (centre, radius) in; (hit, along the normal, t, 0), (barycentric, both
-// distances to the sphere) out.
+// Unit kernel of lib/ray.glsl: a ray (origin, direction), three corners and (centre, radius) in; (hit, along the
+// normal, t, 0), (barycentric, both distances to the sphere) out.
 #version 460
 #include "lib/math.glsl"
 #include "lib/ray.glsl"

@@ -1,4 +1,5 @@
-// Unit kernel of lib/sampler.glsl: (seed, pixel, set, index), (bits, mask, 0, 0) in; the set's numbers (bit patterns) out.
+// Unit kernel of lib/sampler.glsl: (seed, pixel, set, index), (bits, mask, 0, 0) in; the set's numbers (bit patterns)
+// out.
 #version 460
 #include "lib/sampler.glsl"
 

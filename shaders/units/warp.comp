@@ -1,4 +1,5 @@
-// Unit kernel of lib/warp.glsl: (u, v, 1 - cos of a cone, 0) in; a direction and its density of the sphere, the cosine hemisphere and the cone out.
+// Unit kernel of lib/warp.glsl: (u, v, 1 - cos of a cone, 0) in; a direction and its density of the sphere, the cosine
+// hemisphere and the cone out.
 #version 460
 #include "lib/warp.glsl"
 

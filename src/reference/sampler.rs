@@ -22,7 +22,8 @@ pub fn laine_karras(x: u32, seed: u32) -> u32 {
     x
 }
 
-/// Point number `index` of an Owen-scrambled Sobol sequence in four dimensions, of which the index takes the low `bits` bits.
+/// Point number `index` of an Owen-scrambled Sobol sequence in four dimensions, of which the index takes the low `bits`
+/// bits.
 pub fn sobol_set(seed: u32, pixel: u32, set: u32, index: u32, bits: u32) -> DVec4 {
     let key = pcg4d([pixel, set, seed, 0x7f4a_7c15]);
     let reversed = laine_karras(index.reverse_bits(), key[0] ^ key[3].wrapping_mul(0x9e37_79b9));

@@ -44,8 +44,8 @@ impl Comparison {
         }
     }
 
-    /// The largest error, in units of what is allowed, if the expected numbers are put through `fault` first; or the first
-    /// pair that is too far apart.
+    /// The largest error, in units of what is allowed, if the expected numbers are put through `fault` first; or the
+    /// first pair that is too far apart.
     fn verdict(&self, fault: impl Fn(f64) -> f64) -> Result<f64, String> {
         let Tolerance { function, relative, absolute } = self.tolerance;
         let mut worst = 0f64;

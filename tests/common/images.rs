@@ -46,8 +46,8 @@ pub fn average(image: &Image) -> DVec3 {
     image.iter().sum::<DVec3>() / image.len() as f64
 }
 
-/// Why two images of the same paths are not the same, if so: a share of at least 98 % of the pixels must agree to a relative
-/// 1e-3, and the means to 5e-3 (paths on which rounding turned a decision are independent samples).
+/// Why two images of the same paths are not the same, if so: a share of at least 98 % of the pixels must agree to a
+/// relative 1e-3, and the means to 5e-3 (paths on which rounding turned a decision are independent samples).
 pub fn compare(one: &Image, two: &Image) -> Result<f64, String> {
     let agrees = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().cmple(a.abs().max(b.abs()) * 1e-3 + 1e-9).all();
     let share = one.iter().zip(two).filter(|pair| agrees(*pair)).count() as f64 / one.len() as f64;
@@ -61,9 +61,9 @@ pub fn compare(one: &Image, two: &Image) -> Result<f64, String> {
     Ok(share)
 }
 
-/// Mean radiance of all pixels in each of `count` independent batches of `spp` samples a pixel, and the tables' own kernel. The scene is
-/// packed for `spp` samples, a power of two: behind these the sampler begins again with other scrambling, as if with another
-/// seed.
+/// Mean radiance of all pixels in each of `count` independent batches of `spp` samples a pixel, and the tables' own
+/// kernel. The scene is packed for `spp` samples, a power of two: behind these the sampler begins again with other
+/// scrambling, as if with another seed.
 pub fn batches(scene: &tyndall::scene::Scene, seed: u32, spp: u32, count: u32) -> Vec<DVec3> {
     assert!(spp.is_power_of_two() && spp >= tyndall::render::BLOCK_SAMPLES);
     let packed = super::scenes::pack(scene, seed, spp);

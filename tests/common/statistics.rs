@@ -11,8 +11,8 @@ fn ln_gamma(x: f64) -> f64 {
     (x - 0.5) * x.ln() - x + 0.5 * (2.0 * std::f64::consts::PI).ln() + series + shift
 }
 
-/// Probability that χ² with `freedom` degrees exceeds x: the incomplete gamma function by its series, or beyond its middle by its
-/// continued fraction (Abramowitz and Stegun 6.5.29 and 6.5.31).
+/// Probability that χ² with `freedom` degrees exceeds x: the incomplete gamma function by its series, or beyond its
+/// middle by its continued fraction (Abramowitz and Stegun 6.5.29 and 6.5.31).
 pub fn chi_squared_tail(x: f64, freedom: f64) -> f64 {
     let (a, x) = (freedom / 2.0, x / 2.0);
     if x <= 0.0 {

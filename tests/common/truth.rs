@@ -1,5 +1,5 @@
-//! Tables of known answers: deterministic quadrature and closed forms, made independently of this program. Each value has an
-//! estimate of its absolute error.
+//! Tables of known answers: deterministic quadrature and closed forms, made independently of this program. Each value
+//! has an estimate of its absolute error.
 
 use serde_json::Value;
 

@@ -2,6 +2,7 @@
 
 use super::{device, scenes};
 use bytemuck::Pod;
+use glam::{DVec3, Vec3};
 use tyndall::gpu::buffer::Buffer;
 use tyndall::gpu::kernel::Kernel;
 use tyndall::gpu::shader::{Variant, compile_cached, expand};
@@ -43,4 +44,9 @@ pub fn vec4(values: &[f64]) -> [f32; 4] {
     let mut vector = [0.0; 4];
     vector.iter_mut().zip(values).for_each(|(to, from)| *to = *from as f32);
     vector
+}
+
+/// A vector of single precision, widened.
+pub fn widen(numbers: &[f32]) -> DVec3 {
+    Vec3::from_slice(numbers).as_dvec3()
 }
