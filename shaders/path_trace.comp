@@ -3,9 +3,11 @@
 // A workgroup renders the samples of one tile of pixels. Its invocations take the next sample as soon as their path ends, so
 // none waits for another's long path; each sample has a place of its own, so the order does not matter. One flat loop serves
 // camera, extension and shadow rays: a few steps through the hierarchy, at most one primitive where a leaf is pending, and
-// where a ray is done, the path's next ray.
+// once half of the rays that run in step are done, their paths' next rays. Answering a ray costs much more than a step, so it
+// waits for company: on lavapipe this takes a quarter off the time.
 #version 460
 #extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 #include "lib/bindings.glsl"
 #include "lib/path.glsl"
 #include "lib/bvh.glsl"
@@ -15,8 +17,7 @@ layout(local_size_x = WORKGROUP) in;
 
 shared uint next_sample;
 
-const uint NODE_STEPS = 12u;
-const uint LEAF_STEPS = 1u;
+const uint NODE_STEPS = 8u;
 
 void main() {
     if (gl_LocalInvocationIndex == 0u) {
@@ -38,19 +39,21 @@ void main() {
     Walk walk = Walk(0u, 0u, 0u);
     bool fresh = true; // the invocation has no path yet
     [[dont_unroll]] while (true) {
-        [[dont_unroll]] for (uint k = 0u; k < NODE_STEPS; ++k) {
-            if (walk.node < walk.end && walk.leaf == 0u) {
-                step_walk(NODE(walk.node), grid, hit.t, NODE_COPIES, walk);
+        bool busy;
+        [[dont_unroll]] do {
+            [[dont_unroll]] for (uint k = 0u; k < NODE_STEPS; ++k) {
+                if (walk.node < walk.end && walk.leaf == 0u) {
+                    step_walk(NODE(walk.node), grid, hit.t, NODE_COPIES, walk);
+                }
             }
-        }
-        [[dont_unroll]] for (uint k = 0u; k < LEAF_STEPS; ++k) {
             if (walk.leaf != 0u) {
                 test_primitive(path, ray, next_primitive(walk), hit);
                 if (hit.blocked) {
                     walk = Walk(walk.end, walk.end, 0u);
                 }
             }
-        }
+            busy = walk.node < walk.end || walk.leaf != 0u;
+        } while (subgroupAdd(busy ? 1u : 0u) > gl_SubgroupSize / 2u);
         if (walk.node >= walk.end && walk.leaf == 0u) {
             if (!fresh) {
                 if (HAS_LIGHT_SAMPLING && path.shadow) {

@@ -112,7 +112,7 @@ fn glsl_name(inner: &TypeInner) -> &'static str {
 fn features() -> Vec<Features> {
     let mut features: Vec<Features> = Vec::new();
     for (_, scene) in scenes::all() {
-        let needed = scenes::pack(&scene, 1, 16).features;
+        let needed = scenes::pack(&scene, 1).features;
         features.extend([needed, needed.everything(), Features { node_copies: 1, ..needed }]);
     }
     features
@@ -185,7 +185,7 @@ fn a_struct_that_differs_is_noticed() {
 
 #[test]
 fn push_constants_begin_with_the_addresses() {
-    for (name, offset) in [("path_trace.comp", 48), ("resolve.comp", 0)] {
+    for (name, offset) in [("path_trace.comp", 64), ("resolve.comp", 0)] {
         let source = expand(name, &units::variant()).expect("it expands");
         let module = reflect(&source).unwrap_or_else(|why| panic!("{why}"));
         let push = module
@@ -206,7 +206,7 @@ fn both_forms_of_every_kernel_render_the_same_image() {
     let device = device();
     let mut rendered = 0;
     for (name, scene) in scenes::all() {
-        let packed = scenes::pack(&scene, 3, 16);
+        let packed = scenes::pack(&scene, 3);
         let mut forms = vec![(packed.clone(), packed.features)];
         // Compiling takes longer than rendering: one scene stands for the kernels that can do everything, one for trees
         // too large for eight copies.

@@ -10,6 +10,7 @@ use common::units::{run, vec4};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use tyndall::pack::layout::{LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_TRIANGLE, Light};
+use tyndall::pack::sobol;
 
 /// What the phase function's kernel finds for one number.
 #[derive(Clone, Copy)]
@@ -327,12 +328,17 @@ fn lights_give_the_irradiance_of_closed_forms() {
     }
 }
 
-/// Points of a set for the first `count` samples of a pixel in a render of `1 << bits` samples.
-fn points(seed: u32, pixel: u32, set: u32, first: u32, count: u32, bits: u32) -> Vec<[f64; 4]> {
-    let inputs: Vec<[u32; 4]> =
-        (first..first + count).flat_map(|index| [[seed, pixel, set, index], [bits, (1 << bits) - 1, 0, 0]]).collect();
-    let outputs: Vec<[u32; 4]> = run("sampler", &inputs, &[], count as usize, count as usize);
+/// What the sampler's kernel finds for (seed, pixel, set, index).
+fn numbers(inputs: &[[u32; 4]]) -> Vec<[f64; 4]> {
+    let table = sobol::points();
+    let outputs: Vec<[u32; 4]> = run("sampler", inputs, &[bytemuck::cast_slice(&table)], inputs.len(), inputs.len());
     outputs.into_iter().map(|output| output.map(f32::from_bits).map(f64::from)).collect()
+}
+
+/// Points of a set for some samples of a pixel.
+fn points(seed: u32, pixel: u32, set: u32, first: u32, count: u32) -> Vec<[f64; 4]> {
+    let inputs: Vec<[u32; 4]> = (first..first + count).map(|index| [seed, pixel, set, index]).collect();
+    numbers(&inputs)
 }
 
 /// Whether every elementary interval of the shape 2^-d₀ × 2^-d₁ … has the same number of points.
@@ -387,19 +393,19 @@ fn sobol_points_are_nets() {
     let mut random = Random(51);
     for set in 0..4 {
         let (seed, pixel) = (random.bits() as u32, random.bits() as u32);
-        let all = points(seed, pixel, set, 0, 1024, 10);
+        let all = points(seed, pixel, set, 0, 1024);
         // Every aligned run of a power of two is a net: so is what a block or a part of a render holds.
         for m in 0..=10 {
             for (k, part) in all.chunks(1 << m).enumerate() {
                 check_net(part).unwrap_or_else(|why| panic!("set {set}, points {k} of 2^{m}: {why}"));
             }
         }
-        // Beyond the announced number the sequence begins again, with other points.
-        let again = points(seed, pixel, set, 1024, 1024, 10);
+        // Beyond the table the sequence begins again, with other shifts.
+        let again = points(seed, pixel, set, 1024, 1024);
         check_net(&again).unwrap_or_else(|why| panic!("set {set}, second round: {why}"));
         assert_ne!(all, again);
         // Points that are only random are no net, nor are a net's with one moved.
-        check_net(&points(seed, pixel, 9, 0, 1024, 10)).expect_err("hashed numbers");
+        check_net(&points(seed, pixel, 9, 0, 1024)).expect_err("hashed numbers");
         let mut moved = all.clone();
         moved[77][2] = (moved[77][2] + 0.5).fract();
         check_net(&moved).expect_err("a net with one point moved");
@@ -409,19 +415,17 @@ fn sobol_points_are_nets() {
 #[test]
 fn sets_and_pixels_are_independent_of_each_other() {
     // One number of one set against one of another, over many pixels: uniform on the square.
-    let inputs: Vec<[u32; 4]> = (0..100_000u32)
-        .flat_map(|pixel| [[1, pixel, pixel % 6, 3], [6, 63, 0, 0], [1, pixel, pixel % 6 + 1, 3], [6, 63, 0, 0]])
-        .collect();
-    let outputs: Vec<[u32; 4]> = run("sampler", &inputs, &[], inputs.len() / 2, inputs.len() / 2);
-    let number = |bits: u32| f64::from(f32::from_bits(bits));
+    let inputs: Vec<[u32; 4]> =
+        (0..100_000u32).flat_map(|pixel| [[1, pixel, pixel % 6, 3], [1, pixel, pixel % 6 + 1, 3]]).collect();
+    let outputs = numbers(&inputs);
     for (one, two) in [(0, 0), (0, 1), (2, 3), (3, 1)] {
         let pairs = outputs.chunks(2).map(|pair| {
-            let (a, b) = (number(pair[0][one]), number(pair[1][two]));
+            let (a, b) = (pair[0][one], pair[1][two]);
             ((a * 10.0).floor() + b) / 10.0
         });
         check_uniform(pairs, 100).unwrap_or_else(|why| panic!("dimensions {one} and {two}: {why}"));
     }
-    let same = outputs.chunks(2).map(|pair| ((number(pair[0][0]) * 10.0).floor() + number(pair[0][0])) / 10.0);
+    let same = outputs.chunks(2).map(|pair| ((pair[0][0] * 10.0).floor() + pair[0][0]) / 10.0);
     check_uniform(same, 100).expect_err("a number is not independent of itself");
 }
 

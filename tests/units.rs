@@ -10,6 +10,7 @@ use common::units::{run, vec4, widen};
 use glam::{DVec2, DVec3, Vec3};
 use tyndall::pack::layout::{self, INFINITE_DISTANCE, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_TRIANGLE, Light};
 use tyndall::pack::lights::alias_table;
+use tyndall::pack::sobol;
 use tyndall::reference::{bindings, bsdf, camera, film, light, math, medium, phase, rng, sampler, warp};
 
 /// The numbers k/2²⁴ that matter most: both ends, powers of two, and some in between.
@@ -44,21 +45,26 @@ fn random_numbers_agree_to_the_last_bit() {
 #[test]
 fn sets_of_the_sampler_agree_to_the_last_bit() {
     let mut random = Random(3);
-    let mut inputs = Vec::new();
-    for _ in 0..5000 {
-        let bits = (random.bits() % 33) as u32;
-        let mask = u64::pow(2, bits) as u32;
-        let set = (random.bits() % 12) as u32;
-        inputs.push([random.bits() as u32, random.bits() as u32, set, random.bits() as u32 >> (random.bits() % 32)]);
-        inputs.push([bits, mask.wrapping_sub(1), 0, 0]);
-    }
-    let outputs: Vec<[u32; 4]> = run("sampler", &inputs, &[], inputs.len() / 2, inputs.len() / 2);
-    for (input, output) in inputs.chunks(2).zip(outputs) {
-        let ([seed, pixel, set, index], [bits, mask, ..]) = (input[0], input[1]);
-        let expected = sampler::sample_set(seed, pixel, set, index, bits, mask).to_array();
-        assert_eq!(output.map(f32::from_bits).map(f64::from), expected, "{input:?}");
-        let neighbour = sampler::sample_set(seed, pixel ^ 1, set, index, bits, mask).to_array();
-        assert_ne!(output.map(f32::from_bits).map(f64::from), neighbour, "pixels share their numbers");
+    let table = sobol::points();
+    let inputs: Vec<[u32; 4]> = (0..5000)
+        .map(|_| {
+            let index = random.bits() as u32 >> (random.bits() % 32);
+            [random.bits() as u32, random.bits() as u32, (random.bits() % 12) as u32, index]
+        })
+        .collect();
+    let outputs: Vec<[u32; 4]> = run("sampler", &inputs, &[bytemuck::cast_slice(&table)], inputs.len(), inputs.len());
+    let expected = |[seed, pixel, set, index]: [u32; 4]| {
+        let key = sampler::set_key(seed, pixel, set, index);
+        let point =
+            if set < sobol::SOBOL_SETS { table[sampler::point_index(set, index, key) as usize] } else { [0; 2] };
+        sampler::shifted_point(point, key).to_array()
+    };
+    for (input, output) in inputs.iter().zip(outputs) {
+        let found = output.map(f32::from_bits).map(f64::from);
+        assert_eq!(found, expected(*input), "{input:?}");
+        assert!(found.iter().all(|number| (0.0..1.0).contains(number)), "{input:?}");
+        let neighbour = [input[0], input[1] ^ 1, input[2], input[3]];
+        assert_ne!(found, expected(neighbour), "pixels share their numbers");
     }
 }
 

@@ -9,6 +9,7 @@ use common::tolerances::comparison;
 use common::units::{run, run_variant, variant, vec4, widen};
 use glam::{DMat4, DVec2, DVec3};
 use tyndall::gpu::shader::Variant;
+use tyndall::pack::features::Features;
 use tyndall::reference::ray;
 use tyndall::scene::{Geometry, Mesh, Scene, Shape};
 
@@ -114,7 +115,7 @@ impl Walks {
     fn new(mesh: Mesh, seed: u64) -> Walks {
         let mut scene: Scene = scenes::gray_box();
         scene.shapes = vec![Shape::diffuse("mesh", Geometry::Mesh(mesh), DVec3::ONE)];
-        let packed = scenes::pack(&scene, 1, 1);
+        let packed = scenes::pack(&scene, 1);
         let mut random = Random(seed);
         let (mut rays, mut inside) = (Vec::new(), Vec::new());
         let mut add = |origin: DVec3, direction: DVec3, from_inside| {
@@ -143,7 +144,8 @@ impl Walks {
         Walks { packed, rays, inside }
     }
 
-    fn run(&self, variant: &Variant) -> Vec<[f32; 4]> {
+    fn run(&self) -> Vec<[f32; 4]> {
+        let features = Features { node_copies: self.packed.bvh.copies, ..variant().features };
         let rays = self.rays.iter();
         let inputs: Vec<[f32; 4]> =
             rays.flat_map(|[o, d]| [vec4(&[o.x, o.y, o.z, 100.0]), vec4(&d.to_array())]).collect();
@@ -152,7 +154,7 @@ impl Walks {
             bytemuck::cast_slice(&self.packed.primitives),
             bytemuck::bytes_of(&self.packed.params),
         ];
-        run_variant("bvh", variant, &inputs, &tables, self.rays.len(), self.rays.len())
+        run_variant("bvh", &Variant { features, ..variant() }, &inputs, &tables, self.rays.len(), self.rays.len())
     }
 }
 
@@ -178,7 +180,7 @@ fn walks_find_the_nearest_triangle_and_never_leak() {
     let Geometry::Mesh(cube) = scenes::cuboid(DMat4::IDENTITY) else { unreachable!("a cuboid is a mesh") };
     for (name, mesh) in [("cube", cube), ("octahedron", octahedron()), ("icosphere", scenes::icosphere(3))] {
         let walks = Walks::new(mesh, 7);
-        let outputs = walks.run(&variant());
+        let outputs = walks.run();
         let mut nearest = comparison("nearest hit");
         for (k, ([origin, direction], output)) in walks.rays.iter().zip(&outputs).enumerate() {
             // By trying all triangles, in double precision.
@@ -206,14 +208,14 @@ fn walks_find_the_nearest_triangle_and_never_leak() {
 
 #[test]
 fn the_tree_misses_nothing_in_either_layout() {
-    let walks = Walks::new(scenes::icosphere(3), 8);
-    let eight = walks.run(&variant());
-    // The first of the eight copies alone, and the same with the kernel that turns it by the ray's direction.
-    let mut single = walks.packed.clone();
-    single.bvh.nodes.truncate(single.bvh.node_count as usize);
-    let mut features = variant().features;
-    features.node_copies = 1;
-    let one = Walks { packed: single, ..Walks::new(scenes::icosphere(3), 8) }.run(&Variant { features, ..variant() });
+    let walks = Walks::new(scenes::icosphere(2), 8);
+    assert_eq!(walks.packed.bvh.copies, 8);
+    let eight = walks.run();
+    // The first of the eight copies alone, which the kernel turns by the ray's direction.
+    let mut single = walks;
+    single.packed.bvh.nodes.truncate(single.packed.bvh.node_count as usize);
+    single.packed.bvh.copies = 1;
+    let one = single.run();
     for (a, b) in eight.iter().zip(&one) {
         assert_eq!((a[0], a[2], a[3]), (b[0], b[2], b[3]));
     }
@@ -221,5 +223,5 @@ fn the_tree_misses_nothing_in_either_layout() {
     let mut open = scenes::icosphere(3);
     open.triangles.truncate(open.triangles.len() - 5);
     let open = Walks::new(open, 8);
-    assert!(leaks(&open.run(&variant()), &open.inside) > 0, "a mesh with holes must leak");
+    assert!(leaks(&open.run(), &open.inside) > 0, "a mesh with holes must leak");
 }

@@ -1,16 +1,19 @@
 // The tables of the scene and the buffers of the kernel: by address where the device can (lavapipe gathers these with vector
-// loads), else as storage buffers. Both forms have the same descriptors and the same push constants. naga, which checks the second,
+// loads), else as storage buffers. Both forms have the same descriptors and the same push constants. Nodes and primitives,
+// which every step of a traversal loads, come in words of 64 bits: half as many gathers. naga, which checks the second form,
 // knows no storage buffers that are only written.
 #include "lib/layout.glsl"
 #include "lib/features.glsl"
 
 #ifdef USE_BUFFER_REFERENCE
 #extension GL_EXT_buffer_reference : require
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer NodesAddress { uvec4 at[]; };
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PrimitivesAddress { Primitive at[]; };
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer NodesAddress { u64vec2 at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PrimitivesAddress { u64vec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer SurfacesAddress { Surface at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MediaAddress { Medium at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LightsAddress { Light at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PointsAddress { uvec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer SamplesAddress { vec4 at[]; };
 layout(push_constant) uniform Push {
     NodesAddress nodes;
@@ -18,14 +21,26 @@ layout(push_constant) uniform Push {
     SurfacesAddress surfaces;
     MediaAddress media;
     LightsAddress lights;
+    PointsAddress points;
     SamplesAddress samples;
+    uvec2 unused;
     Dispatch work;
 } push;
-#define NODE(i) push.nodes.at[i]
-#define PRIMITIVE(i) push.primitives.at[i]
+uvec4 load_words(u64vec2 words) {
+    return uvec4(unpack32(words.x), unpack32(words.y));
+}
+Primitive load_primitive(uint i) {
+    uvec4 a = load_words(push.primitives.at[3u * i]);
+    uvec4 b = load_words(push.primitives.at[3u * i + 1u]);
+    uvec4 c = load_words(push.primitives.at[3u * i + 2u]);
+    return Primitive(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), uintBitsToFloat(c.w));
+}
+#define NODE(i) load_words(push.nodes.at[i])
+#define PRIMITIVE(i) load_primitive(i)
 #define SURFACE(i) push.surfaces.at[i]
 #define MEDIUM(i) push.media.at[i]
 #define LIGHT(i) push.lights.at[i]
+#define POINT(i) push.points.at[i]
 #define SAMPLE(i) push.samples.at[i]
 #else
 layout(set = 0, binding = 0, std430) readonly buffer Nodes { uvec4 nodes[]; };
@@ -33,9 +48,10 @@ layout(set = 0, binding = 1, std430) readonly buffer Primitives { Primitive prim
 layout(set = 0, binding = 2, std430) readonly buffer Surfaces { Surface surfaces[]; };
 layout(set = 0, binding = 3, std430) readonly buffer Media { Medium media[]; };
 layout(set = 0, binding = 4, std430) readonly buffer Lights { Light lights[]; };
-layout(set = 0, binding = 5, std430) buffer Samples { vec4 samples[]; };
+layout(set = 0, binding = 5, std430) readonly buffer Points { uvec2 points[]; };
+layout(set = 0, binding = 6, std430) buffer Samples { vec4 samples[]; };
 layout(push_constant) uniform Push {
-    uvec4 addresses[3];
+    uvec4 addresses[4];
     Dispatch work;
 } push;
 #define NODE(i) nodes[i]
@@ -43,6 +59,7 @@ layout(push_constant) uniform Push {
 #define SURFACE(i) surfaces[i]
 #define MEDIUM(i) media[i]
 #define LIGHT(i) lights[i]
+#define POINT(i) points[i]
 #define SAMPLE(i) samples[i]
 #endif
-layout(set = 0, binding = 6, std430) readonly buffer ParamsBuffer { Params params; };
+layout(set = 0, binding = 7, std430) readonly buffer ParamsBuffer { Params params; };

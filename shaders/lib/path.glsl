@@ -67,6 +67,16 @@ struct Hit {
     bool blocked;           // shadow rays: something is in the way
 };
 
+// The four numbers of a set.
+vec4 sample_set(Path path, uint set) {
+    uvec4 key = set_key(params.seed, path.pixel, set, path.sample_index);
+    uvec2 point = uvec2(0u);
+    if (set < SOBOL_SETS) {
+        point = POINT(point_index(set, path.sample_index, key));
+    }
+    return shifted_point(point, key);
+}
+
 uint valid_medium(uint medium) {
     return medium < params.medium_count ? medium : 0u;
 }
@@ -101,7 +111,7 @@ void begin_segment(inout Path path, vec2 u) {
 }
 
 void path_start(inout Path path) {
-    vec4 u = sample_set(params.seed, path.pixel, 0u, path.sample_index, params.sample_bits, params.sample_mask);
+    vec4 u = sample_set(path, 0u);
     uint row = path.pixel / params.film_width, column = path.pixel - row * params.film_width;
     vec2 film = (vec2(column, row) + u.xy) * vec2(params.inverse_width, params.inverse_height);
     vec3 direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
@@ -249,7 +259,7 @@ void scatter(inout Path path, Vertex vertex, vec3 albedo) {
     if (!path.alive) {
         return;
     }
-    vec4 u = sample_set(params.seed, path.pixel, 2u * path.segment + 1u, path.sample_index, params.sample_bits, params.sample_mask);
+    vec4 u = sample_set(path, 2u * path.segment + 1u);
     path.next_direction = sample_scattering(vertex, u.zw);
     path.pdf = eval_scattering(vertex, path.next_direction);
     path.alive = path.pdf > 0.0;
@@ -264,7 +274,7 @@ void scatter(inout Path path, Vertex vertex, vec3 albedo) {
 // Begins the segment after a vertex, unless roulette ends the path.
 void next_segment(inout Path path) {
     path.segment += 1u;
-    vec4 u = sample_set(params.seed, path.pixel, 2u * path.segment, path.sample_index, params.sample_bits, params.sample_mask);
+    vec4 u = sample_set(path, 2u * path.segment);
     if (path.depth >= RR_DEPTH) {
         float most = path.depth < RELENTLESS_DEPTH ? 1.0 : 0.95;
         float keep = min(3.0 * max_component(path.throughput), most);

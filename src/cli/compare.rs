@@ -23,6 +23,8 @@ fn table(comparison: &Comparison) -> String {
     for (name, value) in values {
         writeln!(text, "{name:<15} {value:>14.6e}").expect("a string takes any text");
     }
+    writeln!(text, "{:<15} {:>12.3} %", "agree to 1e-3", 100.0 * comparison.agreement)
+        .expect("a string takes any text");
     writeln!(text, "\n{:<15} {:>14} {:>14} {:>14} {:>10}", "channel", "mean", "reference", "difference", "z")
         .expect("a string takes any text");
     let [r, g, b] = comparison.channels;

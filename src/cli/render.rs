@@ -25,15 +25,16 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
     check_paths(args, &output)?;
 
     let loaded = backend::load(&args.scene, &args.overrides)?;
-    if !args.quiet {
-        for warning in &loaded.warnings {
+    let mut warn = |warning: &str| {
+        if !args.quiet {
             super::say(format_args!("warning: {warning}"));
         }
-    }
+    };
+    loaded.warnings.iter().for_each(|warning| warn(warning));
     let mut scene = loaded.scene;
     let spp = args.apply(&mut scene)?;
 
-    let mut backend = backend::open(&args.device, &scene, args.seed, spp)?;
+    let mut backend = backend::open(&args.device, &scene, args.seed, &mut warn)?;
     // From here on a signal leads to an image. Before, it simply ends the program.
     let interrupt = interrupt::flag()?;
     render(args, &scene, spp, &mut *backend, &interrupt, &output)

@@ -71,7 +71,8 @@ impl Buffer {
     }
 
     fn bytes_mut(&mut self) -> &mut [u8] {
-        let bytes = self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).expect("the memory is host visible");
+        let bytes =
+            self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).expect("the memory is host visible");
         &mut bytes[..self.size as usize]
     }
 

@@ -41,7 +41,10 @@ struct Loader {
 /// The loader lives as long as the process: devices of several renders and tests share it.
 fn loader() -> Result<&'static Loader, Error> {
     static LOADER: OnceLock<Result<Loader, String>> = OnceLock::new();
-    LOADER.get_or_init(|| open_loader().map_err(|error| error.to_string())).as_ref().map_err(|cause| Error::NoLoader(cause.clone()))
+    LOADER
+        .get_or_init(|| open_loader().map_err(|error| error.to_string()))
+        .as_ref()
+        .map_err(|cause| Error::NoLoader(cause.clone()))
 }
 
 /// Tells lavapipe to use the widest vectors that the processor has. Mesa keeps compiled kernels in a cache whose key does not
@@ -94,8 +97,9 @@ fn candidates(loader: &Loader) -> Result<Vec<Candidate>, Error> {
 
 fn describe(loader: &Loader, physical: vk::PhysicalDevice) -> Candidate {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
-    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
-    // SAFETY: only queries; a device older than 1.2 leaves the driver's structure as it is.
+    let mut subgroups = vk::PhysicalDeviceSubgroupProperties::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroups);
+    // SAFETY: only queries; a device older than 1.2 leaves structures that it does not know as they are.
     unsafe { loader.instance.get_physical_device_properties2(physical, &mut properties) };
     let properties = properties.properties;
     // SAFETY: only a query.
@@ -118,6 +122,8 @@ fn describe(loader: &Loader, physical: vk::PhysicalDevice) -> Candidate {
         Some(format!("Vulkan {}.{}, 1.2 is needed", vk::api_version_major(version), vk::api_version_minor(version)))
     } else if queue_family.is_none() {
         Some("no compute queue".to_owned())
+    } else if !subgroups.supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC) {
+        Some("no arithmetic across subgroups".to_owned())
     } else if driver.driver_id == vk::DriverId::MESA_LLVMPIPE && mesa.is_some_and(|major| major < OLDEST_LAVAPIPE) {
         Some(format!("this lavapipe renders wrong images, Mesa {OLDEST_LAVAPIPE} or newer is needed"))
     } else {
@@ -156,7 +162,7 @@ pub struct Device {
     pub info: DeviceInfo,
     /// Invocations that run in step; workgroups have this size.
     pub subgroup_size: u32,
-    /// Buffers have addresses that kernels can use.
+    /// Buffers have addresses that kernels can use, and kernels know words of 64 bits.
     pub buffer_reference: bool,
     /// Host memory and device memory are one.
     pub is_cpu: bool,
@@ -177,13 +183,16 @@ impl Device {
             loader.instance.get_physical_device_features2(candidate.physical, &mut features);
         }
         let is_cpu = properties.properties.device_type == vk::PhysicalDeviceType::CPU;
-        let buffer_reference = supported.buffer_device_address == vk::TRUE;
+        let int64 = features.features.shader_int64;
+        let buffer_reference = supported.buffer_device_address == vk::TRUE && int64 == vk::TRUE;
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(candidate.queue_family)
             .queue_priorities(&priorities)];
         let mut wanted = vk::PhysicalDeviceVulkan12Features::default().buffer_device_address(buffer_reference);
-        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut wanted);
+        let basic = vk::PhysicalDeviceFeatures::default().shader_int64(buffer_reference);
+        let info =
+            vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&basic).push_next(&mut wanted);
         // SAFETY: the structures outlive the call, and only supported features are asked for.
         let raw = check("vkCreateDevice", unsafe { loader.instance.create_device(candidate.physical, &info, None) })?;
         let allocator = Allocator::new(&AllocatorCreateDesc {
@@ -194,7 +203,11 @@ impl Device {
             buffer_device_address: buffer_reference,
             allocation_sizes: Default::default(),
         })
-        .map_err(|cause| Error::Memory { name: "the allocator".to_owned(), size: 0, cause: cause.to_string() })?;
+        .map_err(|cause| Error::Memory {
+            name: "the allocator".to_owned(),
+            size: 0,
+            cause: cause.to_string(),
+        })?;
         // SAFETY: the queue was asked for above.
         let queue = unsafe { raw.get_device_queue(candidate.queue_family, 0) };
         Ok(Arc::new(Device {

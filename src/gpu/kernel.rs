@@ -54,18 +54,22 @@ impl Kernel {
             .collect();
         let set_info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         // SAFETY: here and below, the structures outlive the calls and the handles belong to this device.
-        self.set_layout = check("vkCreateDescriptorSetLayout", unsafe { raw.create_descriptor_set_layout(&set_info, None) })?;
+        self.set_layout =
+            check("vkCreateDescriptorSetLayout", unsafe { raw.create_descriptor_set_layout(&set_info, None) })?;
         let range = vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(push_size);
         let ranges = if push_size > 0 { std::slice::from_ref(&range) } else { &[] };
         let set_layouts = [self.set_layout];
-        let layout_info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(ranges);
+        let layout_info =
+            vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(ranges);
         // SAFETY: as above.
         self.layout = check("vkCreatePipelineLayout", unsafe { raw.create_pipeline_layout(&layout_info, None) })?;
         let module_info = vk::ShaderModuleCreateInfo::default().code(code);
         // SAFETY: the code comes from glslang and is valid SPIR-V.
         let module = check("vkCreateShaderModule", unsafe { raw.create_shader_module(&module_info, None) })?;
-        let stage =
-            vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::COMPUTE).module(module).name(c"main");
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(module)
+            .name(c"main");
         let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
         // SAFETY: as above; the module is no longer needed once the pipeline exists.
         let pipelines = unsafe {

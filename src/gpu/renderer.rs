@@ -6,6 +6,7 @@ use super::shader::{Variant, compile_cached, expand};
 use super::{Device, Error};
 use crate::pack::Packed;
 use crate::pack::layout::{Dispatch, TILE};
+use crate::pack::sobol;
 use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo};
 use std::ops::Range;
 use std::sync::Arc;
@@ -13,8 +14,10 @@ use std::sync::Arc;
 /// Most samples in flight: their radiances take 16 bytes each.
 const MAX_SAMPLES: usize = 1 << 22;
 /// Bindings of the path tracer; the first [`ADDRESSES`] can also be read by address.
-const BINDINGS: u32 = 7;
-const ADDRESSES: usize = 6;
+const BINDINGS: u32 = 8;
+const ADDRESSES: usize = 7;
+/// Bytes of the addresses in the push constants, a multiple of 16.
+const ADDRESS_BYTES: usize = (ADDRESSES * 8).next_multiple_of(16);
 const TILE_PIXELS: usize = (TILE * TILE) as usize;
 
 /// A scene on a device.
@@ -22,8 +25,8 @@ pub struct Renderer {
     device: Arc<Device>,
     path_trace: Kernel,
     resolve: Kernel,
-    /// Nodes, primitives, surfaces, media, lights: the tables that kernels only read.
-    tables: [Buffer; 5],
+    /// Nodes, primitives, surfaces, media, lights, low-discrepancy points: the tables that kernels only read.
+    tables: [Buffer; 6],
     params: Buffer,
     samples: Buffer,
     sums: Buffer,
@@ -46,7 +49,7 @@ impl Renderer {
 
     /// The same with a kernel that can do more than the scene needs, or in another form.
     pub fn with_variant(device: &Arc<Device>, packed: &Packed, variant: &Variant) -> Result<Renderer, Error> {
-        let push_size = ADDRESSES * 8 + size_of::<Dispatch>();
+        let push_size = ADDRESS_BYTES + size_of::<Dispatch>();
         let code = compile_cached(&expand("path_trace.comp", variant)?)?;
         let path_trace = Kernel::new(device, &code, BINDINGS, push_size as u32)?;
         let code = compile_cached(&expand("resolve.comp", variant)?)?;
@@ -57,6 +60,7 @@ impl Renderer {
             Buffer::new(device, "surfaces", &packed.surfaces)?,
             Buffer::new(device, "media", &packed.media)?,
             Buffer::new(device, "lights", &packed.lights)?,
+            Buffer::new(device, "points", &sobol::points())?,
         ];
         let crop = [packed.params.crop_width, packed.params.crop_height];
         let pixels = tile_count(crop) as usize * TILE_PIXELS;
@@ -69,7 +73,11 @@ impl Renderer {
             tables,
             params: Buffer::new(device, "params", &[packed.params])?,
             samples: Buffer::zeroed::<[f32; 4]>(device, "samples", capacity)?,
-            sums: Buffer::zeroed::<[f32; 4]>(device, "sums", 2 * capacity.div_ceil(BLOCK_SAMPLES as usize) + pixels.min(capacity) * 2)?,
+            sums: Buffer::zeroed::<[f32; 4]>(
+                device,
+                "sums",
+                2 * capacity.div_ceil(BLOCK_SAMPLES as usize) + pixels.min(capacity) * 2,
+            )?,
             invalid: Buffer::zeroed::<[u32; 4]>(device, "invalid", capacity / TILE_PIXELS)?,
             crop,
             capacity,
@@ -87,13 +95,14 @@ impl Renderer {
             tile_step: coprime_step(tile_count),
             ..Dispatch::default()
         };
-        let [nodes, primitives, surfaces, media, lights] = &self.tables;
-        let buffers = [nodes, primitives, surfaces, media, lights, &self.samples, &self.params];
-        let addresses: Vec<u64> = if self.device.buffer_reference {
-            buffers[..ADDRESSES].iter().map(|buffer| buffer.address()).collect()
-        } else {
-            vec![0; ADDRESSES]
-        };
+        let [nodes, primitives, surfaces, media, lights, points] = &self.tables;
+        let buffers = [nodes, primitives, surfaces, media, lights, points, &self.samples, &self.params];
+        let mut addresses = [0u64; ADDRESS_BYTES / 8];
+        if self.device.buffer_reference {
+            for (address, buffer) in addresses.iter_mut().zip(&buffers[..ADDRESSES]) {
+                *address = buffer.address();
+            }
+        }
         let push = [bytemuck::cast_slice(&addresses), bytemuck::bytes_of(&work)].concat();
         self.path_trace.dispatch(&buffers, &push, tile_count)?;
 

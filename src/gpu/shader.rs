@@ -1,7 +1,7 @@
 //! From GLSL to SPIR-V: includes, generated files, the compiler, and a cache.
 
 use super::Error;
-use crate::pack::{features::Features, layout, sobol};
+use crate::pack::{features::Features, layout};
 use glslang::{
     Compiler, CompilerOptions, Shader, ShaderInput, ShaderSource, ShaderStage, SpirvVersion, Target, VulkanVersion,
 };
@@ -69,9 +69,14 @@ pub struct Variant {
     pub buffer_reference: bool,
 }
 
-/// Expands a kernel of this crate.
+/// Expands a kernel of this crate, or of the folder that `TYNDALL_SHADERS` names: for work on the kernels without building anew.
 pub fn expand(name: &str, variant: &Variant) -> Result<ShaderSourceText, Error> {
-    expand_with(name, variant, &|path| SOURCES.iter().find(|(file, _)| *file == path).map(|(_, text)| (*text).to_owned()))
+    if let Some(folder) = std::env::var_os("TYNDALL_SHADERS") {
+        return expand_with(name, variant, &|path| std::fs::read_to_string(PathBuf::from(&folder).join(path)).ok());
+    }
+    expand_with(name, variant, &|path| {
+        SOURCES.iter().find(|(file, _)| *file == path).map(|(_, text)| (*text).to_owned())
+    })
 }
 
 /// Expands a kernel whose files come from `find`; the generated ones are added.
@@ -83,14 +88,14 @@ pub fn expand_with(
     let generated = |path: &str| match path {
         "lib/layout.glsl" => Some(layout::glsl()),
         "lib/features.glsl" => Some(variant.features.glsl()),
-        "lib/sobol.glsl" => Some(sobol::glsl()),
         _ => find(path),
     };
     let mut head = String::from("#version 460\n#extension GL_GOOGLE_cpp_style_line_directive : require\n");
     head += "#extension GL_EXT_control_flow_attributes : require\n";
+    head += "#extension GL_KHR_shader_subgroup_arithmetic : require\n";
     head += &format!("#define WORKGROUP {}u\n", variant.workgroup);
     if variant.buffer_reference {
-        head += "#define USE_BUFFER_REFERENCE\n#extension GL_EXT_buffer_reference : require\n";
+        head += "#define USE_BUFFER_REFERENCE\n#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n";
     }
     let mut expansion = Expansion { find: &generated, seen: HashSet::new(), text: head };
     expansion.append(name, ("(the program)", 0))?;
@@ -178,5 +183,6 @@ fn write_whole(folder: &std::path::Path, path: &std::path::Path, bytes: &[u8]) -
 /// `$XDG_CACHE_HOME/tyndall`, or `~/.cache/tyndall`.
 pub fn cache_folder() -> Option<PathBuf> {
     let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|path| path.is_absolute());
-    base.or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache"))).map(|base| base.join("tyndall"))
+    base.or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")))
+        .map(|base| base.join("tyndall"))
 }

@@ -8,6 +8,8 @@
 //! - trimmed relMSE: the same over the 99 % of pixels with the smallest error, so that a few fireflies do not decide it.
 //! - z of a channel: mean(d) / (std(d) / √N), the mean difference in units of its own standard error, as it follows from
 //!   the scatter of d over the N pixels, with the noise of both images in it. A |z| above 4 or so is a bias.
+//! - agreement: the share of pixels in which every channel differs by at most a thousandth of the reference. Two renders along
+//!   the same random numbers agree in nearly all pixels, two independent ones in nearly none.
 //!
 //! All sums are in double precision.
 
@@ -15,6 +17,9 @@ use super::Image;
 
 /// Fraction of the reference's mean that is added (in square) to the denominator of relMSE.
 const FLOOR: f64 = 0.1;
+
+/// Relative difference up to which a pixel counts as agreeing.
+const AGREEMENT: f64 = 1e-3;
 
 /// The differences between an image and a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +30,8 @@ pub struct Comparison {
     pub rel_mse: f64,
     /// Mean relative square error without the worst 1 % of pixels.
     pub trimmed_rel_mse: f64,
+    /// Share of pixels that agree to a thousandth.
+    pub agreement: f64,
     /// Of `R`, `G` and `B`.
     pub channels: [Difference; 3],
     /// Of the mean over the three channels.
@@ -117,12 +124,19 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, MetricsEr
     relative.sort_unstable_by(f64::total_cmp);
     let kept = (99 * pixels).div_ceil(100);
 
+    let agrees = |pixel: &usize| {
+        (0..3).all(|q| {
+            let reference = f64::from(r[q][*pixel]);
+            (f64::from(x[q][*pixel]) - reference).abs() <= AGREEMENT * reference.abs()
+        })
+    };
     let triple = |images: &[&[f32]; 3], pixel: usize| images.map(|channel| f64::from(channel[pixel]));
     let average = |images: &[&[f32]; 3], pixel| triple(images, pixel).iter().sum::<f64>() / 3.0;
     Ok(Comparison {
         mse: square_sum / (3 * pixels) as f64,
         rel_mse,
         trimmed_rel_mse: mean(relative[..kept].iter().copied()),
+        agreement: (0..pixels).filter(agrees).count() as f64 / pixels as f64,
         channels: [0, 1, 2].map(|q| difference(pixels, |p| f64::from(x[q][p]), |p| f64::from(r[q][p]))),
         mean: difference(pixels, |p| average(&x, p), |p| average(&r, p)),
     })

@@ -17,8 +17,9 @@ use obvhs::{Boundable, BvhBuildParams};
 
 /// Most primitives in a leaf: the count has three bits.
 const MAX_LEAF: u32 = 8;
-/// Eight copies of the tree are made as long as they take no more than this, in bytes.
-const MAX_COPIES_SIZE: usize = 64 << 20;
+/// Eight copies of the tree are made as long as they take no more than this, in bytes: they must stay in a processor's own
+/// caches. Beyond, a single copy costs 3 % more steps but a third less time (measured on 20,480 triangles).
+const MAX_COPIES_SIZE: usize = 128 << 10;
 /// Bits of a leaf's first primitive.
 const FIRST_BITS: u32 = 28;
 /// Most primitives that a tree can hold.
@@ -104,7 +105,13 @@ impl Bvh {
     /// A tree that no ray hits.
     fn empty() -> Bvh {
         // An inner node whose near bounds lie behind its far bounds.
-        Bvh { nodes: vec![[0xffff, 0xffff, 0xffff, 1]; 8], node_count: 1, copies: 8, grid_origin: Vec3::ZERO, grid_step: Vec3::ONE }
+        Bvh {
+            nodes: vec![[0xffff, 0xffff, 0xffff, 1]; 8],
+            node_count: 1,
+            copies: 8,
+            grid_origin: Vec3::ZERO,
+            grid_step: Vec3::ONE,
+        }
     }
 }
 

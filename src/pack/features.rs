@@ -115,10 +115,9 @@ impl Features {
         ]
         .map(|(name, value)| format!("const bool {name} = {value};\n"))
         .concat();
-        let numbers =
-            [("MAX_DEPTH", self.max_depth), ("RR_DEPTH", self.rr_depth), ("NODE_COPIES", self.node_copies)]
-                .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
-                .concat();
+        let numbers = [("MAX_DEPTH", self.max_depth), ("RR_DEPTH", self.rr_depth), ("NODE_COPIES", self.node_copies)]
+            .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
+            .concat();
         switches + &numbers
     }
 }

@@ -36,7 +36,11 @@ impl Frame {
         }
         let half = (bounds.max - bounds.min).max_element() / 2.0;
         let scale = if half > 0.0 { (-half.log2().ceil()).exp2() } else { 1.0 };
-        Frame { center: (bounds.min + bounds.max) / 2.0, scale, radius: (bounds.max - bounds.min).length() / 2.0 * scale }
+        Frame {
+            center: (bounds.min + bounds.max) / 2.0,
+            scale,
+            radius: (bounds.max - bounds.min).length() / 2.0 * scale,
+        }
     }
 
     /// A point.

@@ -6,6 +6,7 @@
 //!
 //! A `Vec3` is followed by a scalar that fills its sixteen bytes; a struct's size is a multiple of sixteen.
 
+use super::sobol;
 use glam::{Vec2, Vec3};
 
 /// A type that has a name in GLSL.
@@ -200,22 +201,14 @@ gpu_struct! {
         crop_width: u32,
         /// Rows of the crop window.
         crop_height: u32,
-        /// Samples of the whole render, rounded up to a power of two, minus 1: the mask of Sobol indices.
-        sample_mask: u32,
-        /// Bits set in the mask.
-        sample_bits: u32,
-        /// Extinction coefficient outside of all boundaries.
-        world_sigma_t: Vec3,
         /// Entries in the table of media.
         medium_count: u32,
         /// Columns of the whole film.
         film_width: u32,
+        /// Extinction coefficient outside of all boundaries.
+        world_sigma_t: Vec3,
         /// Fills the sixteen bytes.
-        unused_1: u32,
-        /// Fills the sixteen bytes.
-        unused_2: u32,
-        /// Fills the sixteen bytes.
-        unused_3: u32,
+        unused: u32,
     }
 }
 
@@ -277,6 +270,9 @@ pub fn glsl() -> String {
         ("LIGHT_CONSTANT", LIGHT_CONSTANT),
         ("TILE", TILE),
         ("BLOCK_SAMPLES", crate::render::BLOCK_SAMPLES),
+        ("POINT_BITS", sobol::POINT_BITS),
+        ("POINT_COUNT", sobol::POINT_COUNT),
+        ("SOBOL_SETS", sobol::SOBOL_SETS),
     ]
     .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
     .concat();

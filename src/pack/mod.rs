@@ -66,8 +66,8 @@ pub enum PackError {
 const MAX_MEDIA: usize = 65535;
 
 impl Packed {
-    /// Makes the tables of a render of `sample_count` samples a pixel.
-    pub fn new(scene: &Scene, seed: u32, sample_count: u32) -> Result<Packed, PackError> {
+    /// Makes the tables.
+    pub fn new(scene: &Scene, seed: u32) -> Result<Packed, PackError> {
         let frame = Frame::of(scene);
         let nesting = Nesting::of(scene);
         if scene.media.len() > MAX_MEDIA {
@@ -91,7 +91,6 @@ impl Packed {
         let (bvh, primitives) = Bvh::new(&primitives);
         let lights = lights.finish();
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
-        let mask = sample_count.max(1).checked_next_power_of_two().map_or(u32::MAX, |power| power - 1);
         params = Params {
             seed,
             grid_origin: bvh.grid_origin,
@@ -101,14 +100,11 @@ impl Packed {
             medium_count: media.len() as u32,
             world_sigma_t: media[medium_index(nesting.world) as usize].sigma_t,
             film_width: scene.film.width,
-            sample_mask: mask,
-            sample_bits: mask.count_ones(),
             ..params
         };
         let warnings = nesting.warnings;
         let features = EMPTY_FEATURES;
-        let mut packed =
-            Packed { frame, bvh, primitives, surfaces, media, lights, params, features, warnings };
+        let mut packed = Packed { frame, bvh, primitives, surfaces, media, lights, params, features, warnings };
         packed.features = Features::of(scene, &packed);
         Ok(packed)
     }

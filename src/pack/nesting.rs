@@ -97,7 +97,12 @@ struct Enclosure<'a> {
 impl<'a> Enclosure<'a> {
     fn of((shape, value): (usize, &'a Shape)) -> Option<Enclosure<'a>> {
         let boundary = value.boundary?;
-        Some(Enclosure { shape, geometry: &value.geometry, bounds: Bounds::of(&value.geometry), interior: boundary.interior })
+        Some(Enclosure {
+            shape,
+            geometry: &value.geometry,
+            bounds: Bounds::of(&value.geometry),
+            interior: boundary.interior,
+        })
     }
 
     fn contains(&self, point: DVec3) -> bool {
@@ -106,7 +111,11 @@ impl<'a> Enclosure<'a> {
 }
 
 /// The smallest region that holds a point. Regions that hold the same point are nested, so the smallest is the innermost.
-fn innermost<'a, 'b>(enclosures: &'b [Enclosure<'a>], point: DVec3, except: Option<usize>) -> Option<&'b Enclosure<'a>> {
+fn innermost<'a, 'b>(
+    enclosures: &'b [Enclosure<'a>],
+    point: DVec3,
+    except: Option<usize>,
+) -> Option<&'b Enclosure<'a>> {
     let volume = |enclosure: &Enclosure| (enclosure.bounds.max - enclosure.bounds.min).element_product();
     enclosures
         .iter()

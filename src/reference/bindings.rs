@@ -1,7 +1,7 @@
 //! Mirror of `shaders/lib/bindings.glsl`: the tables of the scene, their numbers widened to double precision.
 
 use crate::pack::features::Features;
-use crate::pack::{Packed, layout};
+use crate::pack::{Packed, layout, sobol};
 use glam::DVec3;
 
 /// What the kernel reads.
@@ -17,6 +17,8 @@ pub struct Tables {
     pub media: Vec<Medium>,
     /// Lights that can be sampled.
     pub lights: Vec<Light>,
+    /// Low-discrepancy points.
+    pub points: Vec<[u32; 2]>,
     /// What holds for the whole render.
     pub params: Params,
     /// Of these, the ones that decide what is rendered; the others only leave out what a scene does not need.
@@ -90,8 +92,6 @@ pub struct Params {
     pub crop_y: u32,
     pub crop_width: u32,
     pub crop_height: u32,
-    pub sample_mask: u32,
-    pub sample_bits: u32,
     pub world_sigma_t: DVec3,
     pub film_width: u32,
 }
@@ -105,6 +105,7 @@ impl Tables {
             surfaces: packed.surfaces.iter().map(Surface::from).collect(),
             media: packed.media.iter().map(Medium::from).collect(),
             lights: packed.lights.iter().map(Light::from).collect(),
+            points: sobol::points(),
             params: Params::from(&packed.params),
             features: packed.features,
         }
@@ -188,8 +189,6 @@ impl From<&layout::Params> for Params {
             crop_y: from.crop_y,
             crop_width: from.crop_width,
             crop_height: from.crop_height,
-            sample_mask: from.sample_mask,
-            sample_bits: from.sample_bits,
             world_sigma_t: from.world_sigma_t.as_dvec3(),
             film_width: from.film_width,
         }

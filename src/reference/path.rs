@@ -14,12 +14,13 @@ use super::medium::{
 };
 use super::phase::{eval_henyey_greenstein, sample_henyey_greenstein};
 use super::ray::{Ray, TriangleHit, intersect_sphere, intersect_triangle, offset_distance};
-use super::sampler::sample_set;
+use super::sampler::{point_index, set_key, shifted_point};
 use super::warp::{from_polar, square_to_cosine_hemisphere};
 use crate::pack::layout;
 use crate::pack::layout::{
     LIGHT_CONSTANT, LIGHT_POINT, LIGHT_SPHERE, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_TWO_SIDED,
 };
+use crate::pack::sobol::SOBOL_SETS;
 use glam::{DVec2, DVec3, DVec4, Vec4Swizzles};
 
 /// Nothing, among indices.
@@ -118,16 +119,19 @@ fn begin_segment(tables: &Tables, path: &mut Path, u: DVec2) {
     path.t_max = flight_end(tables, path);
 }
 
-fn random_set(tables: &Tables, path: &Path, set: u32) -> DVec4 {
-    let params = &tables.params;
-    sample_set(params.seed, path.pixel, set, path.sample_index, params.sample_bits, params.sample_mask)
+/// The four numbers of a set.
+fn sample_set(tables: &Tables, path: &Path, set: u32) -> DVec4 {
+    let key = set_key(tables.params.seed, path.pixel, set, path.sample_index);
+    let point =
+        if set < SOBOL_SETS { tables.points[point_index(set, path.sample_index, key) as usize] } else { [0; 2] };
+    shifted_point(point, key)
 }
 
 /// A ray from the camera, and a free flight for its first segment.
 pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     let mut path = Path { pixel, sample_index, ..Path::default() };
     let params = &tables.params;
-    let u = random_set(tables, &path, 0);
+    let u = sample_set(tables, &path, 0);
     let (row, column) = (pixel / params.film_width, pixel % params.film_width);
     let film = (DVec2::new(f64::from(column), f64::from(row)) + u.xy())
         * DVec2::new(params.inverse_width, params.inverse_height);
@@ -263,7 +267,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex, albedo: DVec3) {
     if !path.alive {
         return;
     }
-    let u = random_set(tables, path, 2 * path.segment + 1);
+    let u = sample_set(tables, path, 2 * path.segment + 1);
     path.next_direction = sample_scattering(vertex, u.zw());
     path.pdf = eval_scattering(vertex, path.next_direction);
     path.alive = path.pdf > 0.0;
@@ -277,7 +281,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex, albedo: DVec3) {
 /// Begins the segment after a vertex, unless roulette ends the path.
 fn next_segment(tables: &Tables, path: &mut Path) {
     path.segment += 1;
-    let u = random_set(tables, path, 2 * path.segment);
+    let u = sample_set(tables, path, 2 * path.segment);
     if path.depth >= tables.features.rr_depth {
         let most = if path.depth < RELENTLESS_DEPTH { 1.0 } else { 0.95 };
         let keep = (3.0 * max_component(path.throughput)).min(most);

@@ -1,51 +1,22 @@
 //! Mirror of `shaders/lib/sampler.glsl`: the points of the integrand, four dimensions at a time.
 
 use super::rng::{pcg4d, to_unit};
-use crate::pack::sobol::reversed_directions;
+use crate::pack::sobol::{POINT_BITS, POINT_COUNT, SOBOL_SETS};
 use glam::DVec4;
-use std::sync::LazyLock;
 
-/// The first sets are Sobol points, later ones are hashed.
-pub const SOBOL_SETS: u32 = 4;
-
-static SOBOL_REVERSED: LazyLock<[[u32; 3]; 32]> = LazyLock::new(reversed_directions);
-
-/// A permutation of the bits' subtrees in which each bit depends on lower bits only: Laine and Karras (2011) with the
-/// constants of Vegdahl (2021). On reversed bits this is Owen's scrambling.
-pub fn laine_karras(x: u32, seed: u32) -> u32 {
-    let mut x = x;
-    x ^= x.wrapping_mul(0x3d20_adea);
-    x = x.wrapping_add(seed);
-    x = x.wrapping_mul(seed >> 16 | 1);
-    x ^= x.wrapping_mul(0x0552_6c56);
-    x ^= x.wrapping_mul(0x53a2_2864);
-    x
+/// The random words of a set: those of the whole pixel where they shift a table's points, those of the sample elsewhere.
+pub fn set_key(seed: u32, pixel: u32, set: u32, index: u32) -> [u32; 4] {
+    pcg4d([pixel, set, seed, if set < SOBOL_SETS { index >> POINT_BITS } else { index }])
 }
 
-/// Point number `index` of an Owen-scrambled Sobol sequence in four dimensions, of which the index takes the low `bits`
-/// bits.
-pub fn sobol_set(seed: u32, pixel: u32, set: u32, index: u32, bits: u32) -> DVec4 {
-    let key = pcg4d([pixel, set, seed, 0x7f4a_7c15]);
-    let reversed = laine_karras(index.reverse_bits(), key[0] ^ key[3].wrapping_mul(0x9e37_79b9));
-    let mut point = [0u32; 4];
-    for bit in 0..bits {
-        let mask = ((reversed << bit) as i32 >> 31) as u32;
-        point[0] ^= mask & 1 << bit;
-        for (coordinate, direction) in point[1..].iter_mut().zip(SOBOL_REVERSED[bit as usize]) {
-            *coordinate ^= mask & direction;
-        }
-    }
-    for (coordinate, key) in point.iter_mut().zip(key) {
-        *coordinate = laine_karras(*coordinate, key);
-    }
-    to_unit(point.map(u32::reverse_bits))
+/// Which of the table's points is next, for a set below [`SOBOL_SETS`].
+pub fn point_index(set: u32, index: u32, key: [u32; 4]) -> u32 {
+    set * POINT_COUNT + ((index ^ (key[0] & 0xff) ^ (key[1] & 0xff) << 4) & (POINT_COUNT - 1))
 }
 
-/// The four numbers of a set.
-pub fn sample_set(seed: u32, pixel: u32, set: u32, index: u32, bits: u32, mask: u32) -> DVec4 {
-    if set < SOBOL_SETS {
-        // Beyond the announced number of samples the sequence begins again with other scrambling.
-        return sobol_set(seed.wrapping_add(index & !mask), pixel, set, index & mask, bits);
-    }
-    to_unit(pcg4d([pixel, index, set, seed]))
+/// A point of the table, its digits shifted by the key, in [0, 1 − 2⁻²⁴].
+pub fn shifted_point(point: [u32; 2], key: [u32; 4]) -> DVec4 {
+    let [low, high] = point;
+    let digits = [low << 16, low & 0xffff_0000, high << 16, high & 0xffff_0000];
+    to_unit([0, 1, 2, 3].map(|k| digits[k] ^ key[k]))
 }

@@ -16,8 +16,11 @@
 
 use glam::{DMat4, DVec2, DVec3};
 
+mod error;
 pub mod mesh;
 pub mod mitsuba;
+
+pub use error::SceneError;
 
 /// Index of a medium in [`Scene::media`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -114,6 +117,12 @@ pub struct Film {
 }
 
 impl Film {
+    /// Longest side of a film, in pixels: both coordinates of a pixel fit in 16 bits.
+    pub const MAX_SIDE: u32 = 65_535;
+
+    /// Most pixels in a crop window. One block of samples holds 24 bytes a pixel, 6.4 GB at this limit.
+    pub const MAX_PIXELS: u64 = 1 << 28;
+
     /// A film that is rendered whole.
     pub fn new(width: u32, height: u32) -> Self {
         Film { width, height, crop: Crop { x: 0, y: 0, width, height } }

@@ -61,13 +61,14 @@ pub fn compare(one: &Image, two: &Image) -> Result<f64, String> {
     Ok(share)
 }
 
-/// Mean radiance of all pixels in each of `count` independent batches of `spp` samples a pixel, and the tables' own
-/// kernel. The scene is packed for `spp` samples, a power of two: behind these the sampler begins again with other
-/// scrambling, as if with another seed.
-pub fn batches(scene: &tyndall::scene::Scene, seed: u32, spp: u32, count: u32) -> Vec<DVec3> {
-    assert!(spp.is_power_of_two() && spp >= tyndall::render::BLOCK_SAMPLES);
-    let packed = super::scenes::pack(scene, seed, spp);
-    let mut renderer = gpu::Renderer::new(device(), &packed).expect("the kernels compile");
-    let blocks = renderer.render(0..spp * count).expect("it renders");
-    blocks.chunks((spp / tyndall::render::BLOCK_SAMPLES) as usize).map(|batch| average(&mean(batch))).collect()
+/// Independent estimates of what all pixels of a scene have in common: the pixels, dealt out to 64 batches. Each pixel has its own
+/// random shift of the sampler's points, while two samples of a pixel may share one and are no independent estimates.
+pub fn batches(scene: &tyndall::scene::Scene, seed: u32, spp: u32) -> Vec<DVec3> {
+    let image = on_device(&super::scenes::pack(scene, seed), spp);
+    assert!(image.len().is_multiple_of(BATCHES) && image.len() > BATCHES, "each batch has as many pixels");
+    let pixels = (image.len() / BATCHES) as f64;
+    (0..BATCHES).map(|first| image.iter().skip(first).step_by(BATCHES).sum::<DVec3>() / pixels).collect()
 }
+
+/// How many estimates [`batches`] returns.
+pub const BATCHES: usize = 64;

@@ -5,8 +5,8 @@ use tyndall::pack::Packed;
 use tyndall::scene::{Bsdf, Camera, Film, Geometry, Light, Medium, Mesh, Phase, Scene, Shape};
 
 /// The tables of a scene.
-pub fn pack(scene: &Scene, seed: u32, sample_count: u32) -> Packed {
-    Packed::new(scene, seed, sample_count).expect("the scene can be packed")
+pub fn pack(scene: &Scene, seed: u32) -> Packed {
+    Packed::new(scene, seed).expect("the scene can be packed")
 }
 
 /// A vector from its components.

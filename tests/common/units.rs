@@ -9,7 +9,7 @@ use tyndall::gpu::shader::{Variant, compile_cached, expand};
 
 /// How unit kernels are compiled.
 pub fn variant() -> Variant {
-    let features = scenes::pack(&scenes::gray_box(), 1, 1).features.everything();
+    let features = scenes::pack(&scenes::gray_box(), 1).features.everything();
     Variant { features, workgroup: device().subgroup_size, buffer_reference: false }
 }
 

@@ -1,0 +1,135 @@
+//! Puts a scene together from the objects of its file.
+
+use std::collections::{HashMap, HashSet};
+
+use super::props::{Child, Props};
+use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
+use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape};
+use crate::scene::{Bsdf, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape};
+
+/// What the converters of single objects share.
+pub(super) struct Context<'a> {
+    pub tree: &'a Tree,
+    pub warnings: Vec<String>,
+    pub media: Vec<Medium>,
+    medium_ids: HashMap<ObjectId, MediumId>,
+}
+
+impl<'a> Context<'a> {
+    /// The properties of an object.
+    pub fn props(&self, child: Child<'a>) -> Props<'a> {
+        Props::new(self.tree, child.object)
+    }
+
+    /// A medium of the scene; every mention of one object is one medium.
+    pub fn medium(&mut self, child: Child<'a>) -> Result<MediumId, SceneError> {
+        if let Some(id) = self.medium_ids.get(&child.id) {
+            return Ok(*id);
+        }
+        let medium = medium::convert(self, child)?;
+        let id = MediumId(self.media.len() as u32);
+        self.media.push(medium);
+        self.medium_ids.insert(child.id, id);
+        Ok(id)
+    }
+}
+
+/// The scene that a tree describes.
+pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
+    let root = &tree.objects[0];
+    let mut context = Context { tree, warnings: Vec::new(), media: Vec::new(), medium_ids: HashMap::new() };
+    let props = Props::new(tree, root);
+    refuse_doubles(root)?;
+
+    let sensors = props.children(Kind::Sensor);
+    let Some(&first) = sensors.first() else {
+        return Err(root.at.error("the scene has no sensor; add <sensor type=\"perspective\">"));
+    };
+    if let Some(second) = sensors.get(1) {
+        let count = sensors.len();
+        context.warnings.push(second.at.warning(format_args!("the first of {count} sensors is used, not this one")));
+    }
+    let sensor = sensor::convert(&mut context, first)?;
+
+    let integrator_child = props.child(Kind::Integrator)?;
+    let integrator = match integrator_child {
+        Some(child) => integrator::convert(&context, child)?,
+        None => Integrator::default(),
+    };
+
+    let mut shapes = Vec::new();
+    for child in props.children(Kind::Shape) {
+        shapes.extend(shape::convert(&mut context, child)?);
+    }
+    let mut lights = Vec::new();
+    for child in props.children(Kind::Emitter) {
+        lights.push(emitter::light(&mut context, child)?);
+    }
+    declarations(&mut context, &props)?;
+    props.finish()?;
+
+    if let Some(child) = integrator_child {
+        integrator::warn_about_media(&mut context, child);
+    }
+    if !has_light(&shapes, &lights) {
+        context.warnings.push(root.at.warning("the scene has no light: the picture will be black"));
+    }
+    let scene = Scene {
+        camera: sensor.camera,
+        film: sensor.film,
+        integrator,
+        shapes,
+        media: context.media,
+        lights,
+        sample_count: sensor.sample_count,
+    };
+    Ok(Loaded { scene, warnings: context.warnings })
+}
+
+/// Media and BSDFs that stand directly in the scene are there to be referred to. They are checked even if nobody does,
+/// since a fault in them is one that waits.
+fn declarations(context: &mut Context<'_>, props: &Props<'_>) -> Result<(), SceneError> {
+    let used: HashSet<ObjectId> =
+        context.tree.objects.iter().skip(1).flat_map(targets).map(|(_, target)| target).collect();
+    for kind in [Kind::Medium, Kind::Bsdf, Kind::Phase] {
+        for child in props.children(kind) {
+            match kind {
+                Kind::Medium => drop(medium::convert(context, child)?),
+                Kind::Bsdf => drop::<Bsdf>(bsdf::convert(context, child)?),
+                _ => drop(medium::phase(context, child)?),
+            }
+            if !used.contains(&child.id) {
+                let name = child.object.id.as_deref().map_or(String::new(), |id| format!(" \"{id}\""));
+                let text = format!("the {kind}{name} is never used");
+                context.warnings.push(child.at.warning(text));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The objects that an object holds or refers to.
+fn targets(object: &Object) -> impl Iterator<Item = (&Property, ObjectId)> {
+    object.properties.iter().filter_map(|property| match property.value {
+        Value::Object(id) => Some((property, id)),
+        _ => None,
+    })
+}
+
+/// A `<ref>` directly in the scene would put what it refers to into the scene for a second time.
+fn refuse_doubles(root: &Object) -> Result<(), SceneError> {
+    let mut seen = HashSet::new();
+    match targets(root).find(|(_, target)| !seen.insert(*target)) {
+        None => Ok(()),
+        Some((property, _)) => Err(property.at.error("this object is part of the scene already")),
+    }
+}
+
+fn has_light(shapes: &[Shape], lights: &[Light]) -> bool {
+    let shines = |radiance: glam::DVec3| radiance.max_element() > 0.0;
+    shapes.iter().any(|shape| shape.emission.is_some_and(shines))
+        || lights.iter().any(|light| match *light {
+            Light::Point { intensity, .. } => shines(intensity),
+            Light::Constant { radiance } => shines(radiance),
+        })
+}

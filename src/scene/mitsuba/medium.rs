@@ -1,0 +1,108 @@
+//! `<medium>` and `<phase>`.
+
+use glam::DVec3;
+
+use super::build::Context;
+use super::props::{Child, Given, unknown_plugin};
+use super::tree::Kind;
+use crate::scene::{Medium, Phase, SceneError};
+
+const TYPES: [&str; 1] = ["homogeneous"];
+const PHASE_TYPES: [&str; 2] = ["isotropic", "hg"];
+
+/// A homogeneous medium, from `sigma_t` and `albedo` as in Mitsuba 3 or from `sigma_s` and `sigma_a` as in 0.6.
+pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Medium, SceneError> {
+    if !TYPES.contains(&child.object.plugin.as_str()) {
+        return Err(unknown_plugin(child.object, &TYPES));
+    }
+    let props = context.props(child);
+    let (sigma_t, albedo) = (props.color("sigma_t")?, props.color("albedo")?);
+    let (sigma_s, sigma_a) = (props.color("sigma_s")?, props.color("sigma_a")?);
+    let scale = props.float("scale")?;
+    // Choices of Mitsuba's estimators; the medium is the same.
+    props.ignore_boolean("has_spectral_extinction")?;
+    props.ignore_boolean("sample_emitters")?;
+    let phase = props.child(Kind::Phase)?;
+    props.finish()?;
+
+    let scale = match scale {
+        Some(given) if given.value < 0.0 => {
+            return Err(given.at.error(format!("scale is {}; it must not be negative", given.value)));
+        }
+        Some(given) => given.value,
+        None => 1.0,
+    };
+    let (sigma_t, albedo) = match (sigma_s, sigma_a) {
+        (None, None) => {
+            let sigma_t = coefficient("sigma_t", sigma_t)?.unwrap_or(DVec3::ONE);
+            (sigma_t, fraction("albedo", albedo)?.unwrap_or(DVec3::splat(0.75)))
+        }
+        (Some(sigma_s), Some(sigma_a)) => {
+            if let Some((name, extra)) = sigma_t.map(|g| ("sigma_t", g)).or(albedo.map(|g| ("albedo", g))) {
+                return Err(extra.at.error(format!(
+                    "{name} contradicts sigma_s and sigma_a; give either sigma_t and albedo or sigma_s and sigma_a"
+                )));
+            }
+            let sigma_s = coefficient("sigma_s", Some(sigma_s))?.unwrap_or_default();
+            let sigma_a = coefficient("sigma_a", Some(sigma_a))?.unwrap_or_default();
+            let sigma_t = sigma_s + sigma_a;
+            let ratio = |s: f64, t: f64| if t > 0.0 { s / t } else { 0.0 };
+            let albedo =
+                DVec3::new(ratio(sigma_s.x, sigma_t.x), ratio(sigma_s.y, sigma_t.y), ratio(sigma_s.z, sigma_t.z));
+            (sigma_t, albedo)
+        }
+        (Some(given), None) | (None, Some(given)) => {
+            return Err(given
+                .at
+                .error("sigma_s and sigma_a are only accepted together; give both of them, or sigma_t and albedo"));
+        }
+    };
+    let sigma_t = sigma_t * scale;
+    if !sigma_t.is_finite() {
+        return Err(child.object.at.error("the extinction coefficient overflows: scale times sigma_t is infinite"));
+    }
+    let phase = match phase {
+        Some(child) => self::phase(context, child)?,
+        None => Phase::Isotropic,
+    };
+    let name = child.object.id.clone().unwrap_or_else(|| format!("medium at {}", child.object.at));
+    Ok(Medium { name, sigma_t, albedo, phase })
+}
+
+/// A phase function.
+pub(super) fn phase<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Phase, SceneError> {
+    let props = context.props(child);
+    let phase = match child.object.plugin.as_str() {
+        "isotropic" => Phase::Isotropic,
+        "hg" => {
+            let g = props.float("g")?;
+            if let Some(given) = &g
+                && given.value.abs() >= 1.0
+            {
+                return Err(given.at.error(format!("g is {}; it must lie between -1 and 1", given.value)));
+            }
+            Phase::HenyeyGreenstein { g: g.map_or(0.8, |given| given.value) }
+        }
+        _ => return Err(unknown_plugin(child.object, &PHASE_TYPES)),
+    };
+    props.finish()?;
+    Ok(phase)
+}
+
+fn coefficient(name: &str, given: Option<Given<DVec3>>) -> Result<Option<DVec3>, SceneError> {
+    match given {
+        Some(given) if given.value.min_element() < 0.0 => {
+            Err(given.at.error(format!("{name} is {}; it must not be negative", given.value)))
+        }
+        other => Ok(other.map(|given| given.value)),
+    }
+}
+
+fn fraction(name: &str, given: Option<Given<DVec3>>) -> Result<Option<DVec3>, SceneError> {
+    match given {
+        Some(given) if given.value.min_element() < 0.0 || given.value.max_element() > 1.0 => {
+            Err(given.at.error(format!("{name} is {}; it must lie between 0 and 1", given.value)))
+        }
+        other => Ok(other.map(|given| given.value)),
+    }
+}

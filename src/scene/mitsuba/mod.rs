@@ -1,0 +1,51 @@
+//! Reads scenes in the XML dialect of Mitsuba 3. `docs/SCENES.md` describes what is supported, and where pictures differ.
+//!
+//! The steps: `xml` turns text into a tree of objects (includes, parameters, references), and one file for each kind of
+//! plugin turns objects into parts of a [`Scene`]. Nothing is ignored silently: what has no meaning here is an error,
+//! what has a slightly different one is a warning.
+
+use std::path::Path;
+
+use super::{Scene, SceneError};
+
+mod bsdf;
+mod build;
+mod element;
+mod emitter;
+mod film;
+mod integrator;
+mod medium;
+mod params;
+mod props;
+mod sensor;
+mod shape;
+mod source;
+mod suggest;
+mod transform;
+mod tree;
+mod values;
+mod xml;
+
+/// A scene, and what its author should know about it.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The scene.
+    pub scene: Scene,
+    /// `file:line:col: text`, in the order in which they were found.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a scene file. `overrides` are names and values that replace those of `<default>`.
+pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Loaded, SceneError> {
+    let file = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|cause| SceneError::Unreadable { file: file.clone(), cause })?;
+    parse_str(source::read_text(&bytes, &file)?, path, overrides)
+}
+
+/// Reads a scene from a text. `file` is what the text is called in messages; file names in it are relative to the
+/// folder of `file`, which itself need not exist.
+pub fn parse_str(text: &str, file: &Path, overrides: &[(String, String)]) -> Result<Loaded, SceneError> {
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let tree = xml::read(text, &file.display().to_string(), folder, overrides)?;
+    build::build(&tree)
+}

@@ -1,0 +1,215 @@
+//! Typed access to the properties of an object. Whatever nobody asked for is an error in the end, which lists what was
+//! asked for, so the list of what is accepted cannot differ from what is read.
+
+use std::cell::{Cell, RefCell};
+
+use glam::{DMat4, DVec3};
+
+use super::suggest::{did_you_mean, list};
+use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
+use crate::scene::SceneError;
+use crate::scene::error::Location;
+
+/// A view of one object that remembers which properties were asked for.
+pub(super) struct Props<'a> {
+    tree: &'a Tree,
+    object: &'a Object,
+    used: Vec<Cell<bool>>,
+    names: RefCell<Vec<&'static str>>,
+    kinds: RefCell<Vec<Kind>>,
+}
+
+/// A value and the place that gave it.
+pub(super) struct Given<'a, T> {
+    pub value: T,
+    pub at: &'a Location,
+}
+
+/// An object inside another, or referred to by it.
+#[derive(Clone, Copy)]
+pub(super) struct Child<'a> {
+    pub id: ObjectId,
+    pub object: &'a Object,
+    /// `name` of the element or of the `<ref>`.
+    pub name: Option<&'a str>,
+    /// The element or the `<ref>`.
+    pub at: &'a Location,
+}
+
+impl<'a> Props<'a> {
+    /// Nothing has been asked for yet.
+    pub fn new(tree: &'a Tree, object: &'a Object) -> Self {
+        let used = object.properties.iter().map(|_| Cell::new(false)).collect();
+        Props { tree, object, used, names: RefCell::default(), kinds: RefCell::default() }
+    }
+
+    /// Where the object stands.
+    pub fn at(&self) -> &'a Location {
+        &self.object.at
+    }
+
+    fn find(&self, name: &'static str) -> Option<&'a Property> {
+        if !self.names.borrow().contains(&name) {
+            self.names.borrow_mut().push(name);
+        }
+        let index = self.object.properties.iter().position(|p| p.name.as_deref() == Some(name))?;
+        self.used[index].set(true);
+        Some(&self.object.properties[index])
+    }
+
+    fn typed<T>(
+        &self,
+        name: &'static str,
+        accepted: &str,
+        convert: impl Fn(&Value) -> Option<T>,
+    ) -> Result<Option<Given<'a, T>>, SceneError> {
+        let Some(property) = self.find(name) else { return Ok(None) };
+        match convert(&property.value) {
+            Some(value) => Ok(Some(Given { value, at: &property.at })),
+            None => {
+                let found = match property.value {
+                    Value::Object(id) => self.tree.objects[id].describe(),
+                    ref other => format!("<{}>", other.tag()),
+                };
+                Err(property.at.error(format!("\"{name}\" is given as {found}; accepted: {accepted}")))
+            }
+        }
+    }
+
+    /// A number.
+    pub fn float(&self, name: &'static str) -> Result<Option<Given<'a, f64>>, SceneError> {
+        self.typed(name, "<float>", |value| match *value {
+            Value::Float(v) => Some(v),
+            Value::Integer(v) => Some(v as f64),
+            _ => None,
+        })
+    }
+
+    /// A whole number.
+    pub fn integer(&self, name: &'static str) -> Result<Option<Given<'a, i64>>, SceneError> {
+        self.typed(name, "<integer>", |value| match *value {
+            Value::Integer(v) => Some(v),
+            _ => None,
+        })
+    }
+
+    /// A truth value.
+    pub fn boolean(&self, name: &'static str) -> Result<Option<Given<'a, bool>>, SceneError> {
+        self.typed(name, "<boolean>", |value| match *value {
+            Value::Boolean(v) => Some(v),
+            _ => None,
+        })
+    }
+
+    /// A text.
+    pub fn string(&self, name: &'static str) -> Result<Option<Given<'a, String>>, SceneError> {
+        self.typed(name, "<string>", |value| match value {
+            Value::String(v) => Some(v.clone()),
+            _ => None,
+        })
+    }
+
+    /// A point or a vector.
+    pub fn vector(&self, name: &'static str) -> Result<Option<Given<'a, DVec3>>, SceneError> {
+        self.typed(name, "<point> or <vector>", |value| match *value {
+            Value::Vector(v) => Some(v),
+            _ => None,
+        })
+    }
+
+    /// A matrix.
+    pub fn transform(&self, name: &'static str) -> Result<Option<Given<'a, DMat4>>, SceneError> {
+        self.typed(name, "<transform>", |value| match *value {
+            Value::Transform(v) => Some(v),
+            _ => None,
+        })
+    }
+
+    /// A quantity of each channel that does not emit: reflectance, albedo, extinction. A constant spectrum has the
+    /// same value in all channels.
+    pub fn color(&self, name: &'static str) -> Result<Option<Given<'a, DVec3>>, SceneError> {
+        self.spectrum(name, DVec3::ONE)
+    }
+
+    /// A radiance or an intensity. A constant spectrum is white point E, which is reddish in sRGB, whose white is
+    /// D65: the XYZ to sRGB matrix (IEC 61966-2-1) times (1, 1, 1). Mitsuba 3.9 converts in the same way.
+    pub fn emission(&self, name: &'static str) -> Result<Option<Given<'a, DVec3>>, SceneError> {
+        self.spectrum(name, DVec3::new(1.204_794, 0.948_291, 0.908_916))
+    }
+
+    fn spectrum(&self, name: &'static str, constant: DVec3) -> Result<Option<Given<'a, DVec3>>, SceneError> {
+        self.typed(name, "<rgb>, <float> or <spectrum>", |value| match *value {
+            Value::Rgb(v) => Some(v),
+            Value::Float(v) => Some(DVec3::splat(v)),
+            Value::Integer(v) => Some(DVec3::splat(v as f64)),
+            Value::Spectrum(v) => Some(v * constant),
+            _ => None,
+        })
+    }
+
+    /// Accepts a property that does not change the picture.
+    pub fn ignore_boolean(&self, name: &'static str) -> Result<(), SceneError> {
+        self.boolean(name).map(drop)
+    }
+
+    /// The nested and referenced objects of a kind.
+    pub fn children(&self, kind: Kind) -> Vec<Child<'a>> {
+        self.kinds.borrow_mut().push(kind);
+        let mut found = Vec::new();
+        for (property, used) in self.object.properties.iter().zip(&self.used) {
+            let Value::Object(id) = property.value else { continue };
+            let object = &self.tree.objects[id];
+            if object.kind == kind && !used.get() {
+                used.set(true);
+                found.push(Child { id, object, name: property.name.as_deref(), at: &property.at });
+            }
+        }
+        found
+    }
+
+    /// The one nested object of a kind, if there is any.
+    pub fn child(&self, kind: Kind) -> Result<Option<Child<'a>>, SceneError> {
+        let found = self.children(kind);
+        match found[..] {
+            [] => Ok(None),
+            [child] => Ok(Some(child)),
+            [first, second, ..] => Err(second.at.error(format!(
+                "{} can have only one <{kind}>; the first is at {}",
+                self.object.describe(),
+                first.at
+            ))),
+        }
+    }
+
+    /// Complains about the first property that nobody asked for.
+    pub fn finish(self) -> Result<(), SceneError> {
+        let unused = self.object.properties.iter().zip(&self.used).find(|(_, used)| !used.get());
+        let Some((property, _)) = unused else { return Ok(()) };
+        let names = self.names.into_inner();
+        let kinds = self.kinds.into_inner();
+        let mut accepted: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+        accepted.extend(kinds.iter().map(|kind| format!("<{kind}>")));
+        let accepted = list(accepted.iter().map(String::as_str));
+        let owner = self.object.describe();
+        Err(property.at.error(match (&property.value, &property.name) {
+            (Value::Object(id), _) => {
+                format!("{owner} has no use for {}; accepted: {accepted}", self.tree.objects[*id].describe())
+            }
+            (_, name) => {
+                let name = name.as_deref().unwrap_or_default();
+                let hint = did_you_mean(name, names.iter().copied());
+                format!("{owner} has no property \"{name}\"{hint}; accepted: {accepted}")
+            }
+        }))
+    }
+}
+
+/// The error about a plugin that is not supported.
+pub(super) fn unknown_plugin(object: &Object, accepted: &[&str]) -> SceneError {
+    object.at.error(format!(
+        "{} is not supported{}; accepted types: {}",
+        object.describe(),
+        did_you_mean(&object.plugin, accepted.iter().copied()),
+        list(accepted.iter().copied())
+    ))
+}

@@ -1,0 +1,144 @@
+//! `<sensor>`: the camera, its film and its sampler.
+
+use glam::{DMat4, DVec2};
+
+use super::build::Context;
+use super::film;
+use super::props::{Child, Given, Props, unknown_plugin};
+use super::tree::Kind;
+use crate::scene::{Camera, Film, SceneError};
+
+const TYPES: [&str; 1] = ["perspective"];
+const FOV_AXES: [&str; 5] = ["x", "y", "smaller", "larger", "diagonal"];
+
+/// What a sensor says.
+pub(super) struct Sensor {
+    pub camera: Camera,
+    pub film: Film,
+    pub sample_count: u32,
+}
+
+/// A pinhole camera.
+pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Sensor, SceneError> {
+    if !TYPES.contains(&child.object.plugin.as_str()) {
+        return Err(unknown_plugin(child.object, &TYPES));
+    }
+    let props = context.props(child);
+    let film = match props.child(Kind::Film)? {
+        Some(film) => film::convert(context, film)?,
+        None => {
+            let text = "the sensor has no film; it gets Mitsuba's of 768 x 576 pixels, with a box filter";
+            context.warnings.push(child.object.at.warning(text));
+            film::default_film()
+        }
+    };
+    let sample_count = match props.child(Kind::Sampler)? {
+        Some(sampler) => film::sample_count(context, sampler)?,
+        None => film::DEFAULT_SAMPLE_COUNT,
+    };
+    let medium = match props.child(Kind::Medium)? {
+        Some(medium) => Some(context.medium(medium)?),
+        None => None,
+    };
+    let fov_x = fov_x(&props, child, &film)?;
+    let (near_clip, far_clip) = clip_planes(&props, child)?;
+    let offset = |name| Ok::<f64, SceneError>(props.float(name)?.map_or(0.0, |given| given.value));
+    let principal_point_offset = DVec2::new(offset("principal_point_offset_x")?, offset("principal_point_offset_y")?);
+    let to_world = match props.transform("to_world")? {
+        Some(given) => rigid(given)?,
+        None => DMat4::IDENTITY,
+    };
+    // Nothing moves and a pinhole has no focus, so these do not change the picture.
+    props.float("shutter_open")?;
+    props.float("shutter_close")?;
+    props.float("focus_distance")?;
+    props.finish()?;
+    let camera = Camera { to_world, fov_x, near_clip, far_clip, principal_point_offset, medium };
+    Ok(Sensor { camera, film, sample_count })
+}
+
+/// The horizontal field of view of the whole film in degrees, by the rules of Mitsuba's `parse_fov`.
+fn fov_x(props: &Props, child: Child, film: &Film) -> Result<f64, SceneError> {
+    let (fov, axis, focal_length) = (props.float("fov")?, props.string("fov_axis")?, props.string("focal_length")?);
+    let aspect = f64::from(film.width) / f64::from(film.height);
+    let (degrees, at, axis) = match (&fov, &focal_length) {
+        (Some(_), Some(second)) => return Err(second.at.error("give either fov or focal_length, not both")),
+        (None, None) => {
+            return Err(child.object.at.error(
+                "the sensor has neither fov nor focal_length; Mitsuba's default is \
+                 <string name=\"focal_length\" value=\"50mm\"/>",
+            ));
+        }
+        (Some(fov), None) => {
+            let name = axis.as_ref().map_or("x".to_owned(), |given| given.value.to_ascii_lowercase());
+            if !FOV_AXES.contains(&name.as_str()) {
+                let at = axis.as_ref().map_or(fov.at, |given| given.at);
+                return Err(at.error(format!("fov_axis is \"{name}\"; accepted: {}", FOV_AXES.join(", "))));
+            }
+            (fov.value, fov.at, name)
+        }
+        (None, Some(length)) => (diagonal_fov(length)?, length.at, "diagonal".to_owned()),
+    };
+    if !(degrees > 0.0 && degrees < 180.0) {
+        return Err(at.error(format!("the field of view is {degrees} degrees; it must lie between 0 and 180")));
+    }
+    let half_tan = (0.5 * degrees.to_radians()).tan();
+    let half_width = match axis.as_str() {
+        "x" => return Ok(degrees),
+        "larger" if aspect > 1.0 => return Ok(degrees),
+        "smaller" if aspect <= 1.0 => return Ok(degrees),
+        "diagonal" => half_tan / (1.0 + 1.0 / (aspect * aspect)).sqrt(),
+        _ => half_tan * aspect,
+    };
+    let fov_x = 2.0 * half_width.atan().to_degrees();
+    if !(fov_x > 0.0 && fov_x < 180.0) {
+        return Err(at.error(format!("the horizontal field of view is {fov_x} degrees; it must lie between 0 and 180")));
+    }
+    Ok(fov_x)
+}
+
+/// The diagonal field of view in degrees of a lens of so many millimetres on 35 mm film (36 mm × 24 mm).
+fn diagonal_fov(length: &Given<String>) -> Result<f64, SceneError> {
+    let text = length.value.trim();
+    let number = text.strip_suffix("mm").unwrap_or(text);
+    match super::values::float(number) {
+        Ok(millimetres) if millimetres > 0.0 => {
+            Ok(2.0 * (f64::hypot(36.0, 24.0) / (2.0 * millimetres)).atan().to_degrees())
+        }
+        _ => Err(length.at.error(format!(
+            "focal_length is \"{}\"; it must be a positive number of millimetres, like \"50mm\"",
+            length.value
+        ))),
+    }
+}
+
+fn clip_planes(props: &Props, child: Child) -> Result<(f64, f64), SceneError> {
+    let (near, far) = (props.float("near_clip")?, props.float("far_clip")?);
+    let at = near.as_ref().or(far.as_ref()).map_or(&child.object.at, |given| given.at);
+    let near = near.map_or(1e-2, |given| given.value);
+    let far = far.map_or(1e4, |given| given.value);
+    if near <= 0.0 || near >= far {
+        return Err(at.error(format!("near_clip is {near} and far_clip {far}; they must be 0 < near_clip < far_clip")));
+    }
+    Ok((near, far))
+}
+
+/// Takes a uniform scale, which does not change the picture, out of a camera's matrix. Mitsuba refuses all scales; the
+/// tolerance is the 1e-3 with which it looks for them.
+fn rigid(given: Given<DMat4>) -> Result<DMat4, SceneError> {
+    const TOLERANCE: f64 = 1e-3;
+    let m = given.value;
+    let axes = [m.x_axis.truncate(), m.y_axis.truncate(), m.z_axis.truncate()];
+    let scale = (axes[0].length() * axes[1].length() * axes[2].length()).cbrt();
+    let off = |value: f64| value.is_nan() || value.abs() > TOLERANCE;
+    let stretched = axes.iter().any(|axis| off(axis.length() / scale - 1.0));
+    let sheared = [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| off(axes[i].dot(axes[j]) / (scale * scale)));
+    if stretched || sheared {
+        return Err(given.at.error(
+            "the camera's to_world stretches or shears; only rotations, translations, mirrors and a uniform scale \
+             are accepted",
+        ));
+    }
+    let [x, y, z] = axes.map(|axis| (axis / scale).extend(0.0));
+    Ok(DMat4::from_cols(x, y, z, m.w_axis))
+}
