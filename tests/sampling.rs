@@ -442,3 +442,18 @@ fn the_tests_statistics_agree_with_printed_tables() {
     }
     assert!((sidak_bound(30, 63.0) - 4.5).abs() < 0.05);
 }
+
+#[test]
+fn directions_are_those_of_another_implementation() {
+    let directions = sobol::directions();
+    let differs = |index: u32, dimension: usize| {
+        let digits =
+            (0..16).filter(|bit| index >> bit & 1 == 1).fold(0, |value, bit| value ^ directions[bit][dimension]);
+        // The crate has the first 16 digits, before it scrambles them.
+        let oracle = sobol_burley::parts::sobol_rev(index.reverse_bits(), dimension as u32).reverse_bits();
+        (digits ^ oracle) >> 16 != 0
+    };
+    for dimension in 0..4 {
+        assert_eq!((0..1 << 16).find(|&index| differs(index, dimension)), None, "dimension {dimension}");
+    }
+}
