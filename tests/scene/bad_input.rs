@@ -374,7 +374,10 @@ fn textures() {
         ("textures/text.png", &["text.png: it is neither a PNG nor an OpenEXR file"]),
         ("textures/broken.png", &["cannot read the image ", "broken.png: "]),
         ("textures/nan.exr", &["nan.exr: pixel (5, 2) is not finite"]),
-        ("textures/nocolor.exr", &["nocolor.exr: it has the channels a.X, a.Z; R, G and B are needed, or Y alone"]),
+        (
+            "textures/nocolor.exr",
+            &["nocolor.exr: it has the channels a.W, a.X, a.Z; R, G and B are needed, or Y alone"],
+        ),
         ("textures", &["cannot read the image "]),
     ] {
         table(&[(&of(file, ""), parts)]);

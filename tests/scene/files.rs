@@ -40,7 +40,7 @@ fn the_sphere_in_the_box() {
         assert_eq!((wall.emission, wall.boundary, ball.emission), (None, None, None));
         let [medium] = &scene.media[..] else { panic!() };
         assert_eq!((medium.sigma_t, medium.albedo), (DVec3::splat(6.0), DVec3::splat(albedo)));
-        assert_eq!((medium.phase, medium.name.as_str()), (phase, "m"));
+        assert_eq!((&medium.phase, medium.name.as_str()), (&phase, "m"));
     }
 }
 

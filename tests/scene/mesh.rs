@@ -101,9 +101,9 @@ fn what_an_obj_file_may_hold() {
     assert_eq!(obj.mesh.triangles, [[0, 1, 2]]);
     assert!(obj.has_normals);
     // Corners without a normal or texture coordinates in a file that has some.
-    assert_eq!(obj.mesh.normals, [DVec3::ZERO, DVec3::Z, DVec3::ZERO]);
-    assert_eq!(obj.mesh.uvs, [DVec2::new(0.0, 1.0), DVec2::ZERO, DVec2::ZERO]);
-    assert_eq!(obj.missing_uvs, 2);
+    assert_eq!(obj.mesh.normals, [DVec3::Z, DVec3::Z, DVec3::ZERO]);
+    assert_eq!(obj.mesh.uvs, [DVec2::new(0.0, 1.0), DVec2::ZERO, DVec2::new(0.5, 0.0)]);
+    assert_eq!(obj.missing_uvs, 1);
 }
 
 #[test]
