@@ -4,6 +4,8 @@
 
 #[path = "scene/bad_input.rs"]
 mod bad_input;
+#[path = "scene/bad_materials.rs"]
+mod bad_materials;
 #[path = "scene/check.rs"]
 mod check;
 #[path = "scene/docs.rs"]
