@@ -4,18 +4,28 @@
 
 #[path = "scene/bad_input.rs"]
 mod bad_input;
+#[path = "scene/bad_materials.rs"]
+mod bad_materials;
+#[path = "scene/check.rs"]
+mod check;
 #[path = "scene/docs.rs"]
 mod docs;
 #[path = "scene/features.rs"]
 mod features;
 #[path = "scene/files.rs"]
 mod files;
+#[path = "scene/materials.rs"]
+mod materials;
 #[path = "scene/mesh.rs"]
 mod mesh;
 #[path = "scene/robustness.rs"]
 mod robustness;
 #[path = "scene/sensor.rs"]
 mod sensor;
+#[path = "scene/textures.rs"]
+mod textures;
+#[path = "scene/unsupported.rs"]
+mod unsupported;
 
 use std::path::{Path, PathBuf};
 

@@ -79,6 +79,8 @@ impl LightTable {
                 // Through the disc of a sphere about the scene, from all directions.
                 self.push(light, mean(*radiance) * 4.0 * PI * PI * frame.radius.max(0.5).powi(2));
             }
+            // `support` has refused these.
+            scene::Light::Spot { .. } | scene::Light::Directional { .. } | scene::Light::Envmap { .. } => {}
         }
     }
 

@@ -1,6 +1,6 @@
 //! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
 
-use crate::scene::{Bsdf, Geometry, MediumId, Scene, Shape};
+use crate::scene::{Bsdf, Geometry, MediumId, Phase, Scene, Shape, Texture};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
@@ -10,6 +10,7 @@ pub mod layout;
 pub mod lights;
 pub mod nesting;
 pub mod sobol;
+mod support;
 
 use bvh::Bvh;
 use features::Features;
@@ -60,6 +61,14 @@ pub enum PackError {
         /// Its value.
         value: f64,
     },
+    /// Part of a scene that kernels cannot render yet.
+    #[error("{what} of \"{name}\" cannot be rendered yet")]
+    Unsupported {
+        /// What it is.
+        what: &'static str,
+        /// Of which shape, medium or emitter.
+        name: String,
+    },
 }
 
 /// Media that 16 bits can name, vacuum apart.
@@ -68,6 +77,7 @@ const MAX_MEDIA: usize = 65535;
 impl Packed {
     /// Makes the tables.
     pub fn new(scene: &Scene, seed: u32) -> Result<Packed, PackError> {
+        let simplified = support::check(scene)?;
         let frame = Frame::of(scene);
         let nesting = Nesting::of(scene);
         if scene.media.len() > MAX_MEDIA {
@@ -102,7 +112,7 @@ impl Packed {
             film_width: scene.film.width,
             ..params
         };
-        let warnings = nesting.warnings;
+        let warnings = [nesting.warnings, simplified].concat();
         let features = EMPTY_FEATURES;
         let mut packed = Packed { frame, bvh, primitives, surfaces, media, lights, params, features, warnings };
         packed.features = Features::of(scene, &packed);
@@ -153,8 +163,9 @@ fn pack_media(scene: &Scene, frame: &Frame) -> Result<Vec<Medium>, PackError> {
             return Err(PackError::OutOfRange { what: "sigma_t", name: medium.name.clone(), value });
         }
         let g = match medium.phase {
-            crate::scene::Phase::Isotropic => 0.0,
-            crate::scene::Phase::HenyeyGreenstein { g } => nearest_below_one(g),
+            Phase::HenyeyGreenstein { g } => nearest_below_one(g),
+            // `support` has refused all others.
+            _ => 0.0,
         };
         media.push(Medium { sigma_t, g, albedo: medium.albedo.as_vec3(), unused: 0 });
     }
@@ -168,9 +179,10 @@ fn nearest_below_one(g: f64) -> f32 {
 }
 
 fn pack_surface(shape: &Shape, exterior: Option<MediumId>, media: &[Medium]) -> Surface {
-    let (reflectance, two_sided) = match shape.bsdf {
-        Bsdf::Null => (DVec3::ZERO, true),
-        Bsdf::Diffuse { reflectance, two_sided } => (reflectance, two_sided),
+    let (reflectance, two_sided) = match &shape.bsdf {
+        Bsdf::Diffuse { reflectance: Texture::Constant(reflectance), two_sided } => (*reflectance, *two_sided),
+        // `support` has refused all others but `null`.
+        _ => (DVec3::ZERO, true),
     };
     let (inside, outside) = match shape.boundary {
         Some(boundary) => (medium_index(boundary.interior), medium_index(exterior)),

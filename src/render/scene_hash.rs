@@ -8,7 +8,8 @@ use crate::scene::{Film, Scene};
 ///
 /// The number of samples and the crop window do not, so the parts of one picture have the same hash. Names of shapes and
 /// media count. The hash is FNV-1a (64 bit; Fowler, Noll and Vo, IETF draft-eastlake-fnv) of the description's debug
-/// form, which has every field of every part, with numbers exact to the last bit.
+/// form, which has every field of every part, with numbers exact to the last bit; of an image it has the size and a hash of the
+/// pixels.
 pub fn scene_hash(scene: &Scene) -> String {
     // Taken apart without `..`, so that a new field cannot be forgotten here.
     let Scene { camera, film, integrator, shapes, media, lights, sample_count: _ } = scene;
@@ -35,8 +36,8 @@ impl Write for Fnv1a {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Camera, Crop, Light};
-    use glam::DVec3;
+    use crate::scene::{Bitmap, Camera, Crop, Light};
+    use glam::{DMat3, DVec3};
 
     fn scene() -> Scene {
         let mut scene = Scene::new(Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 40.0), Film::new(8, 4));
@@ -71,7 +72,16 @@ mod tests {
         camera.camera.fov_x = 41.0;
         let mut film = scene();
         film.film = Film::new(4, 8);
-        for other in [lamp, camera, film] {
+        let mut sky = scene();
+        let envmap = |pixel: f32| {
+            let bitmap = Bitmap::new(2, 3, [vec![[1.0; 3]; 5], vec![[1.0, 1.0, pixel]]].concat()).unwrap();
+            Light::Envmap { bitmap: bitmap.into(), scale: 1.0, to_world: DMat3::IDENTITY }
+        };
+        sky.lights[0] = envmap(1.0);
+        let mut other_sky = scene();
+        other_sky.lights[0] = envmap(1.0 + f32::EPSILON);
+        assert_ne!(scene_hash(&sky), scene_hash(&other_sky), "one bit of one pixel");
+        for other in [lamp, camera, film, sky] {
             assert_ne!(scene_hash(&other), hash);
         }
     }

@@ -12,15 +12,26 @@
 //! ```
 //!
 //! Units: lengths in scene units, `sigma_*` in 1/scene unit, radiance in W/(m² sr) for each of the three linear sRGB
-//! channels, intensity in W/sr. Angles are in degrees where a scene file has them in degrees.
+//! channels, intensity in W/sr, irradiance in W/m². Angles are in degrees where a scene file has them in degrees.
 
-use glam::{DMat4, DVec2, DVec3};
+use std::sync::Arc;
 
+use glam::{DMat3, DMat4, DVec2, DVec3};
+
+pub mod bitmap;
+mod bsdf;
+pub mod check;
 mod error;
 pub mod mesh;
 pub mod mitsuba;
+mod phase;
+mod texture;
 
+pub use bitmap::Bitmap;
+pub use bsdf::{Bsdf, Distribution, Roughness};
 pub use error::SceneError;
+pub use phase::Phase;
+pub use texture::{Filter, Texture, Wrap};
 
 /// Index of a medium in [`Scene::media`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -189,13 +200,13 @@ impl Shape {
 
     /// A surface that reflects diffusely on both sides.
     pub fn diffuse(name: &str, geometry: Geometry, reflectance: DVec3) -> Self {
-        let bsdf = Bsdf::Diffuse { reflectance, two_sided: true };
+        let bsdf = Bsdf::Diffuse { reflectance: reflectance.into(), two_sided: true };
         Shape { name: name.to_owned(), geometry, bsdf, emission: None, boundary: None }
     }
 
     /// A black surface that emits `radiance` on the side of its normal.
     pub fn lamp(name: &str, geometry: Geometry, radiance: DVec3) -> Self {
-        let bsdf = Bsdf::Diffuse { reflectance: DVec3::ZERO, two_sided: false };
+        let bsdf = Bsdf::Diffuse { reflectance: DVec3::ZERO.into(), two_sided: false };
         Shape { name: name.to_owned(), geometry, bsdf, emission: Some(radiance), boundary: None }
     }
 }
@@ -214,7 +225,8 @@ pub struct Boundary {
 pub enum Geometry {
     /// Triangles.
     Mesh(Mesh),
-    /// A sphere; its normals point outwards unless `flipped`.
+    /// A sphere; its normals point outwards unless `flipped`. Texture coordinates of the point with the unit outward
+    /// direction d: u = atan2(d.y, d.x) / 2π in \[0, 1), v = acos(d.z) / π.
     Sphere {
         /// Centre, in world space.
         center: DVec3,
@@ -225,27 +237,17 @@ pub enum Geometry {
     },
 }
 
-/// Triangles in world space, counter-clockwise seen from the side that the normal points to.
-#[derive(Clone, Debug, Default)]
+/// Triangles in world space, counter-clockwise seen from the side that the geometric normal points to.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Corners.
+    /// Vertices. One place may be several vertices, with different normals or texture coordinates.
     pub positions: Vec<DVec3>,
-    /// Three indices into `positions` for each triangle.
+    /// Unit shading normal of each vertex, on the side of the geometric normals; empty if the triangles are flat.
+    pub normals: Vec<DVec3>,
+    /// Texture coordinates of each vertex, (0, 0) at the upper left of an image; empty if there are none.
+    pub uvs: Vec<DVec2>,
+    /// Three indices into `positions` (and `normals` and `uvs`) for each triangle.
     pub triangles: Vec<[u32; 3]>,
-}
-
-/// What a surface does to light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bsdf {
-    /// Nothing: light goes straight on.
-    Null,
-    /// Lambert's law.
-    Diffuse {
-        /// Reflected fraction of each channel, in \[0, 1\].
-        reflectance: DVec3,
-        /// Reflects on both sides; otherwise the back is black.
-        two_sided: bool,
-    },
 }
 
 /// A homogeneous participating medium.
@@ -259,25 +261,16 @@ pub struct Medium {
     pub albedo: DVec3,
     /// Where scattered light goes.
     pub phase: Phase,
+    /// Radiance that is added per unit length in every direction, W/(m² sr) per scene unit, ≥ 0. It does not depend on
+    /// `sigma_t`: a medium that neither absorbs nor scatters may glow.
+    pub emission: DVec3,
 }
 
 impl Medium {
-    /// A medium from its extinction coefficient and albedo.
+    /// A medium from its extinction coefficient and albedo, which does not emit.
     pub fn new(name: &str, sigma_t: DVec3, albedo: DVec3, phase: Phase) -> Self {
-        Medium { name: name.to_owned(), sigma_t, albedo, phase }
+        Medium { name: name.to_owned(), sigma_t, albedo, phase, emission: DVec3::ZERO }
     }
-}
-
-/// Phase function. The angle is the one between the directions of propagation before and after: cos = +1 is straight on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Phase {
-    /// 1/(4π) everywhere.
-    Isotropic,
-    /// Henyey and Greenstein (1941).
-    HenyeyGreenstein {
-        /// Mean cosine, in (−1, 1); positive is forward.
-        g: f64,
-    },
 }
 
 /// A light source without a surface.
@@ -295,4 +288,61 @@ pub enum Light {
         /// W/(m² sr).
         radiance: DVec3,
     },
+    /// A point that emits into a cone. With θ the angle to `direction` the intensity is `intensity` up to `beam_width`, falls
+    /// linearly *with the angle* to 0 at `cutoff_angle`, and is 0 beyond: `intensity · (cutoff − θ) / (cutoff − beam)`.
+    Spot {
+        /// World space.
+        position: DVec3,
+        /// The axis of the cone, a unit vector from the light into the scene.
+        direction: DVec3,
+        /// Radiant intensity on the axis, W/sr.
+        intensity: DVec3,
+        /// Half the opening angle of the cone, degrees, in (0, 180].
+        cutoff_angle: f64,
+        /// Half the opening angle of the part at full intensity, degrees, in \[0, cutoff_angle\]; where both are the same
+        /// the edge is hard.
+        beam_width: f64,
+    },
+    /// Parallel light from infinitely far.
+    Directional {
+        /// Where the light goes, a unit vector.
+        direction: DVec3,
+        /// On a surface that faces the light, W/m².
+        irradiance: DVec3,
+    },
+    /// Radiance from infinitely far, from an image in latitude-longitude format.
+    ///
+    /// The radiance that *arrives from* the unit direction `d` (a vector from the scene to the sky, world space) is
+    /// [`Light::sky_uv`]`(to_world⁻¹ d)` looked up by [`Bitmap::sky`] and multiplied by `scale`.
+    Envmap {
+        /// At least 2 × 3 pixels; W/(m² sr), ≥ 0.
+        bitmap: Arc<Bitmap>,
+        /// Factor of the pixels, ≥ 0.
+        scale: f64,
+        /// From the image's axes to the world's: a rotation, possibly with a mirror.
+        to_world: DMat3,
+    },
+}
+
+impl Light {
+    /// Where an environment map has the direction `d`, a unit vector in its own axes.
+    ///
+    /// v = acos(d.y) / π, so the first row of the image is up (+y) and the last one down. u = atan2(d.x, −d.z) / 2π in
+    /// \[0, 1): the left edge (u = 0 and 1) is −z, u = 1/4 is +x, the middle of the image is +z and u = 3/4 is −x; seen from
+    /// inside with +y up, x of the image grows to the right from −z over +x. Convention of Mitsuba's `envmap`, checked with 3.9.1.
+    pub fn sky_uv(d: DVec3) -> DVec2 {
+        let u = d.x.atan2(-d.z) / std::f64::consts::TAU;
+        DVec2::new(u - u.floor(), d.y.clamp(-1.0, 1.0).acos() / std::f64::consts::PI)
+    }
+
+    /// Whether it gives any light at all.
+    pub fn shines(&self) -> bool {
+        let value = match *self {
+            Light::Point { intensity, .. } | Light::Spot { intensity, .. } => intensity,
+            Light::Constant { radiance } => radiance,
+            Light::Directional { irradiance, .. } => irradiance,
+            Light::Envmap { ref bitmap, scale, .. } => DVec3::splat(scale * f64::from(bitmap.max())),
+        };
+        value.max_element() > 0.0
+    }
 }

@@ -17,7 +17,7 @@ pub fn v(x: f64, y: f64, z: f64) -> DVec3 {
 /// A parallelogram, counter-clockwise from a corner along the first edge.
 pub fn quad(corner: DVec3, edge_1: DVec3, edge_2: DVec3) -> Geometry {
     let positions = vec![corner, corner + edge_1, corner + edge_1 + edge_2, corner + edge_2];
-    Geometry::Mesh(Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]] })
+    Geometry::Mesh(Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() })
 }
 
 /// A sphere with normals outwards.
@@ -35,7 +35,7 @@ pub fn cuboid(to_world: DMat4) -> Geometry {
         .collect();
     let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
-    Geometry::Mesh(Mesh { positions, triangles })
+    Geometry::Mesh(Mesh { positions, triangles, ..Mesh::default() })
 }
 
 /// An icosahedron whose triangles are split `level` times, on a unit sphere.
@@ -76,7 +76,7 @@ pub fn icosphere(level: u32) -> Mesh {
             })
             .collect();
     }
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 fn phase(g: f64) -> Phase {
@@ -97,7 +97,7 @@ fn walls(scene: &mut Scene) {
     scene.shapes.push(Shape::diffuse("back", quad(v(-1.0, -1.0, -1.0), x, y), white));
     scene.shapes.push(Shape::diffuse("left", quad(v(-1.0, -1.0, 1.0), -z, y), red));
     let mut right = Shape::diffuse("right", quad(v(1.0, -1.0, -1.0), z, y), green);
-    right.bsdf = Bsdf::Diffuse { reflectance: green, two_sided: false };
+    right.bsdf = Bsdf::Diffuse { reflectance: green.into(), two_sided: false };
     scene.shapes.push(right);
 }
 
@@ -165,7 +165,7 @@ pub fn sphere_light() -> Scene {
     walls(&mut scene);
     scene.shapes.push(Shape::lamp("ball", ball(v(-0.3, 0.3, -0.2), 0.25), v(4.0, 5.0, 6.0)));
     let corners = vec![v(0.2, 0.9, -0.2), v(0.7, 0.9, -0.2), v(0.5, 0.9, 0.4)];
-    let triangle = Geometry::Mesh(Mesh { positions: corners, triangles: vec![[0, 1, 2]] });
+    let triangle = Geometry::Mesh(Mesh { positions: corners, triangles: vec![[0, 1, 2]], ..Mesh::default() });
     scene.shapes.push(Shape::lamp("triangle", triangle, v(9.0, 6.0, 3.0)));
     let haze = scene.add_medium(gray(1.5, 0.7, 0.0));
     scene.shapes.push(Shape::boundary("haze", ball(v(0.3, -0.5, 0.2), 0.4), haze));

@@ -21,7 +21,7 @@ fn refused(text: &str, parts: &[&str]) -> Result<(), String> {
 }
 
 /// Checks faults in the body of a scene that is good otherwise.
-fn table(faults: &[(&str, &[&str])]) {
+pub fn table(faults: &[(&str, &[&str])]) {
     let failures: Vec<String> = faults
         .iter()
         .filter_map(|(body, parts)| {
@@ -142,8 +142,16 @@ fn values() {
             &["one value for all wavelengths"],
         ),
         (
-            "<bsdf type=\"diffuse\">‸<texture name=\"reflectance\" type=\"bitmap\"/></bsdf>",
+            "<medium type=\"homogeneous\">‸<texture name=\"sigma_t\" type=\"bitmap\"/></medium>",
             &["given as <texture type=\"bitmap\">", "accepted: <rgb>"],
+        ),
+        (
+            "<bsdf type=\"roughconductor\">‸<texture name=\"alpha\" type=\"checkerboard\"/></bsdf>",
+            &["given as <texture type=\"checkerboard\">", "accepted: <float>"],
+        ),
+        (
+            "<bsdf type=\"diffuse\">‸<bsdf name=\"reflectance\" type=\"null\"/></bsdf>",
+            &["given as <bsdf type=\"null\">", "<texture>"],
         ),
         ("<bsdf type=\"diffuse\">‸<string name=\"reflectance\" value=\"red\"/></bsdf>", &["given as <string>"]),
         (
@@ -209,7 +217,20 @@ fn shapes() {
         ("<shape type=\"cube\">‸<medium type=\"homogeneous\"/></shape>", &["no name", "\"interior\" or \"exterior\""]),
         ("<shape type=\"cube\">‸<medium type=\"homogeneous\" name=\"inside\"/></shape>", &["\"inside\""]),
         ("<shape type=\"cube\">‸<emitter type=\"point\"/></shape>", &["put it directly into <scene>"]),
-        ("<shape type=\"cube\">‸<emitter type=\"spot\"/></shape>", &["not supported", "area"]),
+        ("<shape type=\"cube\">‸<emitter type=\"spot\"/></shape>", &["put it directly into <scene>"]),
+        ("<shape type=\"cube\">‸<emitter type=\"sunsky\"/></shape>", &["not supported", "area"]),
+        (
+            "‸<shape type=\"obj\"><string name=\"filename\" value=\"meshes/ball.obj\"/><bsdf type=\"diffuse\"><texture type=\"checkerboard\" name=\"reflectance\"/></bsdf></shape>",
+            &["has a texture", "no texture coordinates"],
+        ),
+        (
+            "‸<shape type=\"obj\"><string name=\"filename\" value=\"meshes/ball.obj\"/><bsdf type=\"mask\"><bsdf type=\"roughconductor\"><float name=\"alpha_u\" value=\"0.1\"/><float name=\"alpha_v\" value=\"0.2\"/></bsdf></bsdf></shape>",
+            &["has anisotropic roughness", "no texture coordinates"],
+        ),
+        (
+            "‸<shape type=\"sphere\"><transform name=\"to_world\"><rotate x=\"1\" angle=\"5\"/></transform><bsdf type=\"diffuse\"><texture type=\"checkerboard\" name=\"reflectance\"/></bsdf></shape>",
+            &["has a texture", "turns or mirrors"],
+        ),
         ("<shape type=\"cube\">‸<sensor type=\"perspective\"/></shape>", &["no use for <sensor"]),
         ("<shape type=\"cube\">‸<volume type=\"gridvolume\" name=\"a\"/></shape>", &["no use for <volume"]),
     ]);
@@ -232,7 +253,28 @@ fn materials_and_media() {
         ),
         ("<phase type=\"hg\">‸<float name=\"g\" value=\"1\"/></phase>", "between -1 and 1"),
         ("<phase type=\"hg\">‸<float name=\"g\" value=\"-1.5\"/></phase>", "between -1 and 1"),
-        ("‸<phase type=\"rayleigh\"/>", "accepted types: isotropic, hg"),
+        ("‸<phase type=\"sggx\"/>", "accepted types: isotropic, hg, rayleigh, blendphase, tabphase"),
+        (
+            "‸<phase type=\"blendphase\"><phase type=\"hg\"/><phase type=\"hg\"/></phase>",
+            "needs <float name=\"weight\"",
+        ),
+        (
+            "<phase type=\"blendphase\">‸<float name=\"weight\" value=\"1.5\"/><phase type=\"hg\"/><phase type=\"hg\"/></phase>",
+            "weight is 1.5; it must lie between 0 and 1",
+        ),
+        (
+            "‸<phase type=\"blendphase\"><float name=\"weight\" value=\"1\"/><phase type=\"hg\"/></phase>",
+            "holds 1 phase functions",
+        ),
+        ("‸<phase type=\"tabphase\"/>", "needs <string name=\"values\""),
+        ("<phase type=\"tabphase\">‸<string name=\"values\" value=\"1\"/></phase>", "at least two numbers"),
+        ("<phase type=\"tabphase\">‸<string name=\"values\" value=\"1, -1\"/></phase>", "not negative"),
+        ("<phase type=\"tabphase\">‸<string name=\"values\" value=\"0 0\"/></phase>", "one greater than 0"),
+        (
+            "<phase type=\"tabphase\">‸<string name=\"values\" value=\"1 nan\"/></phase>",
+            "\"nan\" is not a finite number",
+        ),
+        ("‸<rgb name=\"emission\" value=\"0 -1 0\"/>", "emission is [0, -1, 0]; it must not be negative"),
         ("<phase type=\"isotropic\">‸<float name=\"g\" value=\"0\"/></phase>", "no property \"g\""),
         ("‸<float name=\"sigmat\" value=\"0\"/>", "did you mean \"sigma_t\"?"),
     ] {
@@ -244,7 +286,8 @@ fn materials_and_media() {
             "‸<medium type=\"homogeneous\"><float name=\"sigma_t\" value=\"1e300\"/><float name=\"scale\" value=\"1e300\"/></medium>",
             &["overflows"],
         ),
-        ("‸<bsdf type=\"dielectric\" id=\"b\"/>", &["accepted types: diffuse, null, twosided"]),
+        ("‸<bsdf type=\"principled\" id=\"b\"/>", &["accepted types: diffuse, null, twosided, dielectric"]),
+        ("‸<bsdf type=\"roughdielectrik\" id=\"b\"/>", &["did you mean \"roughdielectric\"?"]),
         ("<bsdf type=\"twosided\">‸<bsdf type=\"null\"/></bsdf>", &["cannot hold <bsdf type=\"null\">"]),
         ("‸<bsdf type=\"twosided\"/>", &["holds 0 BSDFs"]),
         ("‸<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>", &["holds 2 BSDFs"]),
@@ -257,7 +300,10 @@ fn materials_and_media() {
 fn lights_and_integrators() {
     table(&[
         ("‸<emitter type=\"area\"/>", &["must be inside the <shape>"]),
-        ("‸<emitter type=\"envmap\"/>", &["not supported", "accepted types: area, point, constant"]),
+        (
+            "‸<emitter type=\"sunsky\"/>",
+            &["not supported", "accepted types: area, point, spot, directional, constant, envmap"],
+        ),
         ("<emitter type=\"constant\">‸<rgb name=\"radiance\" value=\"1 -1 1\"/></emitter>", &["must not be negative"]),
         (
             "<emitter type=\"point\"><point name=\"position\" x=\"0\" y=\"0\" z=\"0\"/>‸<transform name=\"to_world\"/></emitter>",

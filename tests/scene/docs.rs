@@ -39,6 +39,12 @@ fn every_property_is_documented() {
     let sampler =
         r#"<sensor type="perspective"><float name="fov" value="1"/><sampler type="ldsampler">‸</sampler></sensor>"#;
     let ball = r#"<shape type="obj"><string name="filename" value="meshes/ball.obj"/>‸</shape>"#;
+    let blend = format!(
+        r#"<phase type="blendphase"><float name="weight" value="0"/>{0}{0}‸</phase>"#,
+        r#"<phase type="isotropic"/>"#
+    );
+    let bitmap = r#"<texture type="bitmap"><string name="filename" value="textures/colors.png"/>‸</texture>"#;
+    let sky = r#"<emitter type="envmap"><string name="filename" value="textures/sky.exr"/>‸</emitter>"#;
     for (heading, element, common) in [
         (
             "### `<sensor type=\"perspective\">`",
@@ -50,12 +56,31 @@ fn every_property_is_documented() {
         ("### `<integrator type=\"volpath\">`", r#"<integrator type="volpathmis">‸</integrator>"#, &[]),
         ("### `<medium type=\"homogeneous\">`", r#"<medium type="homogeneous">‸</medium>"#, &[]),
         ("### `<phase type=\"hg\">`", r#"<phase type="hg">‸</phase>"#, &[]),
+        ("### `<phase type=\"blendphase\">`", &blend, &[]),
+        (
+            "### `<phase type=\"tabphase\">`",
+            r#"<phase type="tabphase"><string name="values" value="1 1"/>‸</phase>"#,
+            &[],
+        ),
         ("### `<shape type=\"obj\">`", ball, shape),
         ("### `<shape type=\"rectangle\">`", r#"<shape type="rectangle">‸</shape>"#, shape),
         ("### `<shape type=\"cube\">`", r#"<shape type="cube">‸</shape>"#, shape),
         ("### `<shape type=\"sphere\">`", r#"<shape type="sphere">‸</shape>"#, shape),
         ("### `<bsdf type=\"diffuse\">`", r#"<bsdf type="diffuse">‸</bsdf>"#, &[]),
         ("### `<bsdf type=\"null\">`", r#"<bsdf type="null">‸</bsdf>"#, &[]),
+        ("### `<bsdf type=\"dielectric\">`", r#"<bsdf type="dielectric">‸</bsdf>"#, &[]),
+        ("### `<bsdf type=\"dielectric\">`", r#"<bsdf type="thindielectric">‸</bsdf>"#, &[]),
+        ("### `<bsdf type=\"roughdielectric\">`", r#"<bsdf type="roughdielectric">‸</bsdf>"#, &[]),
+        ("### `<bsdf type=\"conductor\">`", r#"<bsdf type="conductor">‸</bsdf>"#, &[]),
+        ("### `<bsdf type=\"roughconductor\">`", r#"<bsdf type="roughconductor">‸</bsdf>"#, &[]),
+        ("### `<bsdf type=\"plastic\">`", r#"<bsdf type="plastic">‸</bsdf>"#, &[]),
+        ("### `<bsdf type=\"roughplastic\">`", r#"<bsdf type="roughplastic">‸</bsdf>"#, &[]),
+        ("### `<bsdf type=\"mask\">`", r#"<bsdf type="mask"><bsdf type="null"/>‸</bsdf>"#, &[]),
+        ("### `<texture type=\"bitmap\">`", bitmap, &[]),
+        ("### `<texture type=\"checkerboard\">`", r#"<texture type="checkerboard">‸</texture>"#, &[]),
+        ("### `<emitter type=\"spot\">`", r#"<emitter type="spot">‸</emitter>"#, &[]),
+        ("### `<emitter type=\"directional\">`", r#"<emitter type="directional">‸</emitter>"#, &[]),
+        ("### `<emitter type=\"envmap\">`", sky, &[]),
         ("### `<emitter type=\"area\">`", r#"<shape type="cube"><emitter type="area">‸</emitter></shape>"#, &[]),
         ("### `<emitter type=\"point\">`", r#"<emitter type="point">‸</emitter>"#, &[]),
         ("### `<emitter type=\"constant\">`", r#"<emitter type="constant">‸</emitter>"#, &[]),

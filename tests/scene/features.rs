@@ -13,7 +13,7 @@ fn medium(inside: &str) -> Medium {
 }
 
 fn bsdf(inside: &str) -> Bsdf {
-    scene(&format!(r#"<shape type="sphere">{inside}</shape>"#)).shapes[0].bsdf
+    scene(&format!(r#"<shape type="sphere">{inside}</shape>"#)).shapes[0].bsdf.clone()
 }
 
 fn light(inside: &str) -> Light {
@@ -29,6 +29,7 @@ fn integrator(inside: &str) -> Integrator {
 fn media() {
     let m = medium("");
     assert_eq!((m.sigma_t, m.albedo, m.phase), (DVec3::ONE, DVec3::splat(0.75), Phase::Isotropic));
+    assert_eq!(m.emission, DVec3::ZERO);
 
     let m = medium(
         r#"<rgb name="sigma_t" value="1 2 30"/><float name="scale" value="2"/><float name="albedo" value="0.5"/>
@@ -41,6 +42,9 @@ fn media() {
     assert_eq!(medium(r#"<phase type="hg"/>"#).phase, Phase::HenyeyGreenstein { g: 0.8 });
     assert_eq!(medium(r#"<spectrum name="sigma_t" value="3"/>"#).sigma_t, DVec3::splat(3.0));
     assert_eq!(medium(r#"<integer name="sigma_t" value="3"/>"#).sigma_t, DVec3::splat(3.0));
+
+    let m = medium(r#"<rgb name="emission" value="1 2 3"/><float name="scale" value="7"/>"#);
+    assert_eq!((m.sigma_t, m.emission), (DVec3::splat(7.0), DVec3::new(1.0, 2.0, 3.0)));
 
     // The albedo of a channel without extinction is 0, not 0/0.
     let m = medium(r#"<rgb name="sigma_s" value="1 2 0"/><rgb name="sigma_a" value="3 2 0"/>"#);
@@ -63,14 +67,14 @@ fn one_medium_for_all_references() {
 
 #[test]
 fn bsdfs() {
-    let one_sided = |v: f64| Bsdf::Diffuse { reflectance: DVec3::splat(v), two_sided: false };
+    let one_sided = |v: f64| Bsdf::Diffuse { reflectance: DVec3::splat(v).into(), two_sided: false };
     assert_eq!(bsdf(""), one_sided(0.5));
     assert_eq!(bsdf(r#"<bsdf type="diffuse"/>"#), one_sided(0.5));
     assert_eq!(bsdf(r#"<bsdf type="diffuse"><float name="reflectance" value="0.25"/></bsdf>"#), one_sided(0.25));
     assert_eq!(bsdf(r#"<bsdf type="diffuse"><spectrum name="reflectance" value="0.25"/></bsdf>"#), one_sided(0.25));
     assert_eq!(bsdf(r##"<bsdf type="diffuse"><rgb name="reflectance" value="#ffffff"/></bsdf>"##), one_sided(1.0));
     assert_eq!(bsdf(r#"<bsdf type="null"/>"#), Bsdf::Null);
-    let two_sided = Bsdf::Diffuse { reflectance: DVec3::new(0.1, 0.2, 0.3), two_sided: true };
+    let two_sided = Bsdf::Diffuse { reflectance: DVec3::new(0.1, 0.2, 0.3).into(), two_sided: true };
     let inner = r#"<bsdf type="diffuse"><rgb name="reflectance" value="0.1, 0.2, 0.3"/></bsdf>"#;
     assert_eq!(bsdf(&format!(r#"<bsdf type="twosided">{inner}</bsdf>"#)), two_sided);
 }
@@ -79,12 +83,12 @@ fn bsdfs() {
 fn lamps() {
     let lamp = |inside: &str| {
         let s = scene(&format!(r#"<shape type="rectangle"><emitter type="area">{inside}</emitter></shape>"#));
-        (s.shapes[0].emission.unwrap(), s.shapes[0].bsdf)
+        (s.shapes[0].emission.unwrap(), s.shapes[0].bsdf.clone())
     };
-    let black = Bsdf::Diffuse { reflectance: DVec3::ZERO, two_sided: false };
-    assert_eq!(lamp(""), (DVec3::ONE, black));
-    assert_eq!(lamp(r#"<rgb name="radiance" value="17,12,4"/>"#), (DVec3::new(17.0, 12.0, 4.0), black));
-    assert_eq!(lamp(r#"<float name="radiance" value="3"/>"#), (DVec3::splat(3.0), black));
+    let black = || Bsdf::Diffuse { reflectance: DVec3::ZERO.into(), two_sided: false };
+    assert_eq!(lamp(""), (DVec3::ONE, black()));
+    assert_eq!(lamp(r#"<rgb name="radiance" value="17,12,4"/>"#), (DVec3::new(17.0, 12.0, 4.0), black()));
+    assert_eq!(lamp(r#"<float name="radiance" value="3"/>"#), (DVec3::splat(3.0), black()));
     // What Mitsuba 3.9.1 prints for the same element.
     let (radiance, _) = lamp(r#"<spectrum name="radiance" value="3"/>"#);
     assert!((radiance - DVec3::new(3.61438, 2.84487, 2.72675)).abs().max_element() < 1e-5, "{radiance}");
@@ -183,7 +187,7 @@ fn parameters() {
         let overrides: Vec<_> = overrides.iter().map(|(n, v)| ((*n).to_owned(), (*v).to_owned())).collect();
         let shapes = mitsuba::parse_str(&text, std::path::Path::new("scene.xml"), &overrides).unwrap().scene.shapes;
         let Geometry::Sphere { radius, .. } = shapes[0].geometry else { panic!() };
-        let Bsdf::Diffuse { reflectance, .. } = shapes[0].bsdf else { panic!() };
+        let Bsdf::Diffuse { reflectance: Texture::Constant(reflectance), .. } = shapes[0].bsdf else { panic!() };
         assert_eq!(shapes[1].name, "a$b");
         (radius, reflectance)
     };
@@ -218,10 +222,12 @@ fn what_is_read_differently_warns_with_its_place() {
         ),
         (SENSOR, ":2:1: ", "the first of 2 sensors is used"),
         (
-            r#"<shape type="obj"><string name="filename" value="meshes/ball.obj"/></shape>"#,
+            r#"<emitter type="envmap"><string name="filename" value="textures/negative.exr"/></emitter>"#,
             ":2:1: ",
-            "flat normals are used",
+            "1 pixels of the environment map are negative",
         ),
+        (r#"<texture type="checkerboard" id="t"/>"#, ":2:1: ", "the texture \"t\" is never used"),
+        (r#"<emitter type="spot"><medium type="homogeneous"/></emitter>"#, ":2:22: ", "found from the geometry"),
         (r#"<emitter type="point"><medium type="homogeneous"/></emitter>"#, ":2:23: ", "found from the geometry"),
     ] {
         let got = warning(body);
@@ -233,6 +239,9 @@ fn what_is_read_differently_warns_with_its_place() {
 
     let dark = parse(&format!("<scene version=\"3.0.0\">{SENSOR}</scene>")).unwrap();
     assert!(dark.warnings[0].ends_with("scene.xml:1:1: the scene has no light: the picture will be black"));
+    let glow = r#"<medium type="homogeneous"><rgb name="emission" value="1"/></medium>"#;
+    let sensor = SENSOR.replace("<film", &format!("{glow}<film"));
+    assert_eq!(parse(&format!("<scene version=\"3.0.0\">{sensor}</scene>")).unwrap().warnings, [""; 0]);
     let black = r#"<emitter type="constant"><rgb name="radiance" value="0"/></emitter>"#;
     assert_eq!(parse(&format!("<scene version=\"3.0.0\">{SENSOR}{black}</scene>")).unwrap().warnings.len(), 1);
     assert!(with_warnings("").warnings.is_empty());

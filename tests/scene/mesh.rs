@@ -1,6 +1,6 @@
 //! Shapes: points in world space, the side of the normals, and OBJ files.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use tyndall::scene::mesh::{self, obj};
 use tyndall::scene::mitsuba::{Loaded, parse_str};
@@ -100,6 +100,137 @@ fn what_an_obj_file_may_hold() {
     assert_eq!(obj.mesh.positions, [DVec3::ZERO, DVec3::X, DVec3::Y]);
     assert_eq!(obj.mesh.triangles, [[0, 1, 2]]);
     assert!(obj.has_normals);
+    // Corners without a normal or texture coordinates in a file that has some.
+    assert_eq!(obj.mesh.normals, [DVec3::Z, DVec3::Z, DVec3::ZERO]);
+    assert_eq!(obj.mesh.uvs, [DVec2::new(0.0, 1.0), DVec2::ZERO, DVec2::new(0.5, 0.0)]);
+    assert_eq!(obj.missing_uvs, 1);
+}
+
+#[test]
+fn seams_split_vertices() {
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    let plain = obj::parse(format!("{square}f 1 2 3\nf 1 3 4\n").as_bytes()).unwrap().mesh;
+    assert_eq!((plain.positions.len(), plain.uvs.len(), plain.normals.len()), (4, 0, 0));
+    // One of the shared corners has another texture coordinate in the second triangle, the other the same.
+    let seam = format!("{square}vt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.5\nf 1/1 2/2 3/3\nf 1/4 3/3 4/1\n");
+    let seam = obj::parse(seam.as_bytes()).unwrap().mesh;
+    assert_eq!(seam.triangles, [[0, 1, 2], [3, 2, 4]]);
+    assert_eq!(seam.positions[0], seam.positions[3]);
+    assert_eq!((seam.uvs[0], seam.uvs[3], seam.uvs[4]), (DVec2::ZERO, DVec2::splat(0.5), DVec2::ZERO));
+    // Normals come out as unit vectors, whatever their length; those of length 0 are none.
+    let normals = format!("{square}vn 0 0 5\nvn 1e-300 0 0\nvn 0 0 0\nf 1//1 2//2 3//3\n");
+    assert_eq!(obj::parse(normals.as_bytes()).unwrap().mesh.normals, [DVec3::Z, DVec3::X, DVec3::ZERO]);
+}
+
+/// The largest distance of a mesh's vertex normals from expected ones, for each position in turn.
+fn normal_error(mesh: &Mesh, expected: &[(DVec3, DVec3)]) -> f64 {
+    assert_eq!(mesh.normals.len(), expected.len());
+    expected
+        .iter()
+        .map(|(position, normal)| {
+            let vertex = mesh.positions.iter().position(|p| p == position).unwrap();
+            mesh.normals[vertex].distance(*normal)
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn normals_are_made_as_mitsuba_makes_them() {
+    let text = "v 0 0 0\nv 1 0 0\nv 0 3 0\nv 0 0 2\nv 1 0 2\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 5\n";
+    let Geometry::Mesh(mesh) = with_obj(text).unwrap().scene.shapes[0].geometry.clone() else { panic!() };
+    // What Mitsuba 3.9.1 has as `vertex_normals` of this file, in single precision.
+    let v = DVec3::new;
+    let mut expected = [
+        (v(0.0, 0.0, 0.0), DVec3::splat(0.577_350_26)),
+        (v(1.0, 0.0, 0.0), v(0.0, 0.782_710_55, 0.622_385_8)),
+        (v(0.0, 3.0, 0.0), v(0.877_253_83, 0.0, 0.480_026_66)),
+        (v(0.0, 0.0, 2.0), v(0.530_404_8, 0.847_744_5, 0.0)),
+        (v(1.0, 0.0, 2.0), DVec3::Y),
+    ];
+    assert!(normal_error(&mesh, &expected) < 1e-6, "{:?}", mesh.normals);
+    // Means without weights, and weighted by area, are other directions.
+    expected[2].1 = v(1.0, 0.0, 1.0).normalize();
+    assert!(normal_error(&mesh, &expected) > 0.1);
+}
+
+#[test]
+fn normals_follow_the_triangles() {
+    // A tilted normal in the file, on the side of the triangle.
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0.6 0 0.8\nf 1//1 2//1 3//1\n";
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.obj"), text).unwrap();
+    let read = |inside: &str| {
+        let body = format!(
+            r#"<scene version="3.0.0">{SENSOR}{LIGHT}<shape type="obj"><string name="filename" value="m.obj"/>{inside}</shape></scene>"#
+        );
+        let scene = parse_str(&body, &folder.path().join("s.xml"), &[]).unwrap().scene;
+        let Geometry::Mesh(mesh) = scene.shapes[0].geometry.clone() else { panic!() };
+        let [a, b, c] = mesh.triangles[0].map(|corner| mesh.positions[corner as usize]);
+        (mesh.normals.first().copied(), (b - a).cross(c - a).normalize())
+    };
+    let near = |(normal, flat): (Option<DVec3>, DVec3), expected: DVec3| {
+        let normal = normal.unwrap();
+        assert!(normal.distance(expected) < 1e-12 && normal.dot(flat) > 0.0, "{normal} beside {flat}");
+    };
+    near(read(""), DVec3::new(0.6, 0.0, 0.8));
+    near(read(FLIP), DVec3::new(-0.6, 0.0, -0.8));
+    // A normal is scaled by the inverse: (0.6 / 2, 0, 0.8).
+    let stretch = r#"<transform name="to_world"><scale x="2"/></transform>"#;
+    near(read(stretch), DVec3::new(0.3, 0.0, 0.8).normalize());
+    // A mirror turns the triangle around, and the normal with it.
+    near(read(MIRROR), DVec3::new(0.6, 0.0, -0.8));
+    near(read(&format!("{MIRROR}{FLIP}")), DVec3::new(-0.6, 0.0, 0.8));
+    assert_eq!(read(r#"<boolean name="face_normals" value="true"/>"#).0, None);
+}
+
+#[test]
+fn texture_coordinates() {
+    let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0.1 0.2\nvt 0.9 0.2\nvt 0.9 0.7\nf 1/1 2/2 3/3\n";
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.obj"), text).unwrap();
+    let uvs = |inside: &str| {
+        let body = format!(
+            r#"<scene version="3.0.0">{SENSOR}{LIGHT}<shape type="obj"><string name="filename" value="m.obj"/>{inside}</shape></scene>"#
+        );
+        let loaded = parse_str(&body, &folder.path().join("s.xml"), &[]).unwrap();
+        assert_eq!(loaded.warnings, [""; 0]);
+        let Geometry::Mesh(mesh) = loaded.scene.shapes[0].geometry.clone() else { panic!() };
+        assert!(mesh.normals.is_empty(), "a flat mesh needs none");
+        mesh.uvs
+    };
+    // What Mitsuba 3.9.1 has as `vertex_texcoords`.
+    let flipped = [(0.1, 0.8), (0.9, 0.8), (0.9, 0.3)].map(|(u, v)| DVec2::new(u, v));
+    assert!(uvs("").iter().zip(flipped).all(|(got, want)| got.distance(want) < 1e-12));
+    let plain = uvs(r#"<boolean name="flip_tex_coords" value="false"/>"#);
+    assert_eq!(plain[2], DVec2::new(0.9, 0.7));
+    // Mitsuba 3.9.1 at (0.5, 0.25) of a rectangle and at points of a cube's faces.
+    assert_eq!(uv_at(&mesh::rectangle(), DVec3::new(0.5, 0.25, 0.0)), DVec2::new(0.75, 0.625));
+    for (point, expected) in [
+        ((1.0, 0.5, 0.25), (0.75, 0.375)),
+        ((-1.0, 0.5, 0.25), (0.75, 0.625)),
+        ((0.25, 1.0, 0.5), (0.375, 0.25)),
+        ((0.25, -1.0, 0.5), (0.75, 0.625)),
+        ((0.5, 0.25, 1.0), (0.625, 0.75)),
+        ((0.5, 0.25, -1.0), (0.375, 0.75)),
+    ] {
+        assert_eq!(uv_at(&mesh::cube(), point.into()), expected.into(), "{point:?}");
+    }
+}
+
+/// Texture coordinates at a point of a mesh.
+fn uv_at(mesh: &Mesh, point: DVec3) -> DVec2 {
+    let areas = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize]);
+        let normal = (b - a).cross(c - a);
+        let weight = |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(normal) / normal.length_squared();
+        let inside = (point - a).dot(normal).abs() < 1e-9;
+        inside.then(|| [weight(b, c), weight(c, a), weight(a, b)])
+    };
+    let found = mesh.triangles.iter().find_map(|triangle| {
+        let weights = areas(triangle).filter(|weights| weights.iter().all(|weight| *weight > -1e-9))?;
+        Some((0..3).map(|k| mesh.uvs[triangle[k] as usize] * weights[k]).sum())
+    });
+    found.unwrap_or_else(|| panic!("{point} is on no triangle"))
 }
 
 #[test]

@@ -120,14 +120,19 @@ fn full_scene() -> String {
         <shape type="obj"><string name="filename" value="ball.obj"/><bsdf type="null"/><ref name="interior" id="mist"/>
         <transform name="to_world"><rotate x="1" angle="30"/><matrix value="1 0 0 0 1 0 0 0 1"/></transform></shape>
         <shape type="cube"><ref id="clay"/><emitter type="area"><rgb name="radiance" value="3"/></emitter></shape>
-        <shape type="sphere"><point name="center" x="1" y="2" z="3"/></shape></scene>"##
+        <emitter type="spot"><float name="cutoff_angle" value="30"/></emitter><emitter type="directional"/>
+        <emitter type="envmap"><string name="filename" value="textures/sky.exr"/></emitter>
+        <shape type="rectangle"><bsdf type="mask"><float name="opacity" value="0.25"/><bsdf type="plastic">
+        <texture type="bitmap" name="diffuse_reflectance"><string name="filename" value="textures/colors.png"/></texture>
+        </bsdf></bsdf></shape><bsdf type="roughconductor" id="gold"><string name="material" value="Au"/></bsdf>
+        <shape type="sphere"><point name="center" x="1" y="2" z="3"/><bsdf type="dielectric"/></shape></scene>"##
     )
 }
 
 #[test]
 fn the_scene_that_is_mangled_is_a_good_one() {
     let loaded = parse(&full_scene()).unwrap();
-    assert_eq!((loaded.scene.shapes.len(), loaded.scene.media.len()), (3, 1));
+    assert_eq!((loaded.scene.shapes.len(), loaded.scene.lights.len(), loaded.scene.media.len()), (4, 4, 1));
 }
 
 #[test]

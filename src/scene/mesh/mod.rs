@@ -1,18 +1,31 @@
 //! Triangles: from files and from the simple shapes, moved into world space.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec2, DVec3};
 
 use super::Mesh;
 
 pub mod obj;
 
 impl Mesh {
-    /// Moves every corner. The order of corners stays, so a mirroring transform turns the normals around.
+    /// Moves every vertex. The order of corners stays, so a mirroring transform turns the geometric normals around; shading
+    /// normals stay on their side.
     pub fn transform(&mut self, to_world: &DMat4) {
-        if *to_world != DMat4::IDENTITY {
-            for position in &mut self.positions {
-                *position = to_world.transform_point3(*position);
-            }
+        if *to_world == DMat4::IDENTITY {
+            return;
+        }
+        for position in &mut self.positions {
+            *position = to_world.transform_point3(*position);
+        }
+        let linear = DMat3::from_mat4(*to_world);
+        // The inverse transpose up to a factor, which is the matrix of cofactors, takes normals to normals. It has the sign
+        // of the determinant in it, as normals from transformed corners do.
+        let cofactors = DMat3::from_cols(
+            linear.y_axis.cross(linear.z_axis),
+            linear.z_axis.cross(linear.x_axis),
+            linear.x_axis.cross(linear.y_axis),
+        );
+        for normal in &mut self.normals {
+            *normal = (cofactors * *normal).normalize_or_zero();
         }
     }
 
@@ -21,9 +34,12 @@ impl Mesh {
         for triangle in &mut self.triangles {
             triangle.swap(1, 2);
         }
+        for normal in &mut self.normals {
+            *normal = -*normal;
+        }
     }
 
-    /// Takes out the triangles without area, and returns how many there were. Corners stay, so that indices do.
+    /// Takes out the triangles without area, and returns how many there were. Vertices stay, so that indices do.
     pub fn drop_degenerate(&mut self) -> usize {
         let before = self.triangles.len();
         let positions = &self.positions;
@@ -31,12 +47,41 @@ impl Mesh {
         before - self.triangles.len()
     }
 
-    /// Whether all triangles lie in parallel planes and look to the same side, so that flat and interpolated normals
-    /// are the same.
+    /// Makes a shading normal for every vertex that has none (or one of length 0): the mean of the normals of its
+    /// triangles, weighted by their angles at the vertex (Thürmer and Wüthrich 1998), as Mitsuba's meshes have. Vertices with
+    /// different texture coordinates are different vertices, so a seam of these is an edge.
+    pub fn complete_normals(&mut self) {
+        self.normals.resize(self.positions.len(), DVec3::ZERO);
+        let mut sums = vec![DVec3::ZERO; self.positions.len()];
+        for triangle in &self.triangles {
+            let normal = scaled_normal(&self.positions, triangle).normalize_or_zero();
+            for k in 0..3 {
+                let [at, next, last] = [k, (k + 1) % 3, (k + 2) % 3].map(|k| triangle[k] as usize);
+                let edge = |to: usize| self.positions[to] - self.positions[at];
+                sums[at] += normal * edge(next).angle_between(edge(last));
+            }
+        }
+        for triangle in &self.triangles {
+            let flat = scaled_normal(&self.positions, triangle).normalize_or_zero();
+            for &corner in triangle {
+                let normal = &mut self.normals[corner as usize];
+                if *normal == DVec3::ZERO {
+                    // Normals that cancel out leave no mean; one of them is as good as another.
+                    *normal = sums[corner as usize].try_normalize().unwrap_or(flat);
+                }
+            }
+        }
+        // What no triangle uses is never seen.
+        self.normals.iter_mut().filter(|normal| **normal == DVec3::ZERO).for_each(|normal| *normal = DVec3::Z);
+    }
+
+    /// Whether the shading normals, if there are any, are those of the triangles.
     pub fn is_flat(&self) -> bool {
-        let mut normals = self.triangles.iter().map(|t| scaled_normal(&self.positions, t).normalize_or_zero());
-        let Some(first) = normals.next() else { return true };
-        normals.all(|normal| normal.dot(first) > 1.0 - 1e-9)
+        self.normals.is_empty()
+            || self.triangles.iter().all(|triangle| {
+                let flat = scaled_normal(&self.positions, triangle).normalize_or_zero();
+                triangle.iter().all(|&corner| self.normals[corner as usize].dot(flat) > 1.0 - 1e-9)
+            })
     }
 }
 
@@ -52,20 +97,32 @@ fn scaled_normal(positions: &[DVec3], &[a, b, c]: &[u32; 3]) -> DVec3 {
     unit(b - a).cross(unit(c - a))
 }
 
-/// The square \[-1, 1\]² in the xy plane, whose normal is +z.
+/// The square \[-1, 1\]² in the xy plane, whose normal is +z. Texture coordinates are ((x + 1)/2, (y + 1)/2).
 pub fn rectangle() -> Mesh {
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     Mesh {
-        positions: [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec(),
+        positions: corners.map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec(),
+        normals: Vec::new(),
+        uvs: corners.map(|(x, y)| DVec2::new((x + 1.0) / 2.0, (y + 1.0) / 2.0)).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
     }
 }
 
-/// The cube \[-1, 1\]³, whose normals point outwards. Corner `i` has x, y and z from bits 0, 1 and 2 of `i`.
+/// The cube \[-1, 1\]³, whose normals point outwards. Each face has four vertices of its own, whose texture coordinates
+/// are (0, 1), (1, 1), (1, 0) and (0, 0), as Mitsuba 3.9.1 has them.
 pub fn cube() -> Mesh {
-    let side = |corner: u32, bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    let quads: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    const FACES: [[[i8; 3]; 4]; 6] = [
+        [[1, -1, -1], [1, -1, 1], [-1, -1, 1], [-1, -1, -1]],
+        [[1, 1, -1], [-1, 1, -1], [-1, 1, 1], [1, 1, 1]],
+        [[1, -1, -1], [1, 1, -1], [1, 1, 1], [1, -1, 1]],
+        [[1, -1, 1], [1, 1, 1], [-1, 1, 1], [-1, -1, 1]],
+        [[-1, -1, 1], [-1, 1, 1], [-1, 1, -1], [-1, -1, -1]],
+        [[1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]],
+    ];
     Mesh {
-        positions: (0..8).map(|corner| DVec3::new(side(corner, 0), side(corner, 1), side(corner, 2))).collect(),
-        triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        positions: FACES.iter().flatten().map(|corner| DVec3::from_array(corner.map(f64::from))).collect(),
+        normals: Vec::new(),
+        uvs: [(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)].map(|(u, v)| DVec2::new(u, v)).repeat(6),
+        triangles: (0..6).flat_map(|face| [[0, 1, 2], [0, 2, 3]].map(|t| t.map(|k: u32| 4 * face + k))).collect(),
     }
 }

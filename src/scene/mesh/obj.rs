@@ -1,20 +1,25 @@
-//! Wavefront OBJ files: positions and polygons. Everything else of the format is checked for form, and dropped.
+//! Wavefront OBJ files: positions, normals, texture coordinates and polygons. Everything else of the format is checked
+//! for form, and dropped.
 //!
 //! This is a reader of our own since a mesh decides what is inside a medium, so whatever is odd in a file must be an
 //! error with its line; `tobj`, with which it is compared in the tests, has no line numbers, makes triangles of
 //! polylines (`l`), divides positions by a fourth coordinate and passes NaN on.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::scene::Mesh;
 
 /// A mesh as it is in the file.
 #[derive(Clone, Debug)]
 pub struct Obj {
-    /// Corners that faces use, and triangles.
+    /// Vertices that faces use, and triangles. A position with several normals or texture coordinates is several vertices.
+    /// Normals are unit vectors, or zero where the file has none for a vertex; the list is empty if it has none at all, and so
+    /// is the one of texture coordinates, which are as in the file: (0, 0) is the lower left of an image.
     pub mesh: Mesh,
     /// The file has normals of vertices.
     pub has_normals: bool,
+    /// Vertices without texture coordinates in a file in which others have some; theirs are (0, 0).
+    pub missing_uvs: usize,
 }
 
 /// What is wrong in a file.
@@ -28,7 +33,7 @@ pub struct ObjError {
     pub message: String,
 }
 
-/// Statements without a meaning for the shape: texture coordinates, groups, materials, points, lines, levels of detail.
+/// Statements without a meaning for the shape: groups, materials, points, lines, levels of detail.
 const IGNORED: [&[u8]; 17] = [
     b"vp",
     b"g",
@@ -60,7 +65,7 @@ pub fn parse(bytes: &[u8]) -> Result<Obj, ObjError> {
             message,
         })?;
     }
-    Ok(Obj { mesh: compact(reader.positions, reader.triangles), has_normals: reader.normals > 0 })
+    Ok(reader.finish())
 }
 
 /// A message and the offset in the line that it is about.
@@ -69,12 +74,18 @@ type LineError = (usize, String);
 #[derive(Default)]
 struct Reader {
     positions: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
-    texture_coordinates: usize,
-    normals: usize,
+    uvs: Vec<DVec2>,
+    normals: Vec<DVec3>,
+    triangles: Vec<[Corner; 3]>,
     /// Corners of the face that is being read.
-    polygon: Vec<u32>,
+    polygon: Vec<Corner>,
 }
+
+/// Indices of a position, a texture coordinate and a normal.
+type Corner = [u32; 3];
+
+/// Stands for a texture coordinate or a normal that a corner does not have.
+const NONE: u32 = u32::MAX;
 
 impl Reader {
     fn line(&mut self, line: &[u8]) -> Result<(), LineError> {
@@ -84,12 +95,15 @@ impl Reader {
             b"v" => self.position(start, tokens),
             b"f" => self.face(start, tokens),
             b"vn" => {
-                self.normals += 1;
-                numbers(start, &mut tokens, 3, 3).map(drop)
+                let (n, _) = numbers(start, &mut tokens, 3, 3)?;
+                let n = DVec3::new(n[0], n[1], n[2]);
+                // Scaled first, so that the length neither overflows nor underflows.
+                let n = (n / n.abs().max_element()).try_normalize().unwrap_or_default();
+                push(&mut self.normals, n, start)
             }
             b"vt" => {
-                self.texture_coordinates += 1;
-                numbers(start, &mut tokens, 1, 3).map(drop)
+                let (uv, _) = numbers(start, &mut tokens, 1, 3)?;
+                push(&mut self.uvs, DVec2::new(uv[0], uv[1]), start)
             }
             _ if keyword[0] == b'#' || IGNORED.contains(&keyword) => Ok(()),
             _ => {
@@ -109,13 +123,7 @@ impl Reader {
             5 => {
                 Err((start, "a vertex has 5 numbers; it must have 3, with a weight 4, or with a colour 6 or 7".into()))
             }
-            _ if self.positions.len() == u32::MAX as usize => {
-                Err((start, "more vertices than 32 bits can count".into()))
-            }
-            _ => {
-                self.positions.push(DVec3::new(values[0], values[1], values[2]));
-                Ok(())
-            }
+            _ => push(&mut self.positions, DVec3::new(values[0], values[1], values[2]), start),
         }
     }
 
@@ -133,13 +141,13 @@ impl Reader {
     }
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-    fn corner(&self, token: &[u8]) -> Result<u32, String> {
+    fn corner(&self, token: &[u8]) -> Result<Corner, String> {
         let mut parts = token.split(|byte| *byte == b'/');
-        let vertex = index("vertex", parts.next().unwrap_or_default(), self.positions.len())?;
-        for (what, count) in [("texture coordinate", self.texture_coordinates), ("normal", self.normals)] {
+        let mut corner = [index("vertex", parts.next().unwrap_or_default(), self.positions.len())?, NONE, NONE];
+        for (k, what, count) in [(1, "texture coordinate", self.uvs.len()), (2, "normal", self.normals.len())] {
             match parts.next() {
                 None | Some(b"") => {}
-                Some(part) => drop(index(what, part, count)?),
+                Some(part) => corner[k] = index(what, part, count)?,
             }
         }
         if parts.next().is_some() {
@@ -148,12 +156,62 @@ impl Reader {
                 String::from_utf8_lossy(token)
             ));
         }
-        Ok(vertex as u32)
+        Ok(corner)
+    }
+
+    /// Makes one vertex of each corner that differs from all others, and leaves out what no face uses.
+    fn finish(self) -> Obj {
+        /// The end of a chain.
+        const END: u32 = u32::MAX;
+        // The vertices made from one position are a chain: `first` of the position, then `next` of each vertex.
+        let mut first = vec![END; self.positions.len()];
+        let (mut next, mut corners) = (Vec::<u32>::new(), Vec::<Corner>::new());
+        let mut vertex_of = |corner: Corner| {
+            let mut link = first[corner[0] as usize];
+            while link != END && corners[link as usize] != corner {
+                link = next[link as usize];
+            }
+            if link == END {
+                link = corners.len() as u32;
+                corners.push(corner);
+                next.push(std::mem::replace(&mut first[corner[0] as usize], link));
+            }
+            link
+        };
+        let triangles = self.triangles.iter().map(|triangle| triangle.map(&mut vertex_of)).collect();
+        let missing = |k: usize| corners.iter().filter(|corner| corner[k] == NONE).count();
+        let missing_uvs = if missing(1) == corners.len() { 0 } else { missing(1) };
+        let column = |k: usize| corners.iter().map(move |corner| corner[k]);
+        let mesh = Mesh {
+            positions: column(0).map(|index| self.positions[index as usize]).collect(),
+            normals: if missing(2) == corners.len() {
+                Vec::new()
+            } else {
+                column(2).map(or_zero(&self.normals)).collect()
+            },
+            uvs: if missing(1) == corners.len() { Vec::new() } else { column(1).map(or_zero(&self.uvs)).collect() },
+            triangles,
+        };
+        Obj { mesh, has_normals: !self.normals.is_empty(), missing_uvs }
     }
 }
 
+/// An entry of a list, or zero for [`NONE`].
+fn or_zero<T: Copy + Default>(list: &[T]) -> impl Fn(u32) -> T {
+    |index| list.get(index as usize).copied().unwrap_or_default()
+}
+
+/// Appends to a list whose indices must be below [`NONE`].
+fn push<T>(list: &mut Vec<T>, value: T, start: usize) -> Result<(), LineError> {
+    if list.len() == NONE as usize {
+        return Err((start, "more vertices than 32 bits can count".into()));
+    }
+    list.push(value);
+    Ok(())
+}
+
 /// An index into a list that has `count` entries so far, counted from 0.
-fn index(what: &str, text: &[u8], count: usize) -> Result<usize, String> {
+fn index(what: &str, text: &[u8], count: usize) -> Result<u32, String> {
     let value = std::str::from_utf8(text).ok().and_then(|text| text.parse::<i64>().ok());
     let Some(value) = value else {
         return Err(format!("\"{}\" is not the index of a {what}", String::from_utf8_lossy(text)));
@@ -162,7 +220,8 @@ fn index(what: &str, text: &[u8], count: usize) -> Result<usize, String> {
     if value == 0 || from_start < 0 || from_start >= count as i64 {
         return Err(format!("there is no {what} {value}: the file has {count} of them up to here"));
     }
-    Ok(from_start as usize)
+    // Lists are shorter than that.
+    Ok(from_start as u32)
 }
 
 /// Finite numbers up to the end of the line, and how many there are.
@@ -208,20 +267,4 @@ impl<'a> Iterator for Tokens<'a> {
         }
         Some((start, &rest[..length]))
     }
-}
-
-/// Keeps only the corners that triangles use.
-fn compact(positions: Vec<DVec3>, mut triangles: Vec<[u32; 3]>) -> Mesh {
-    const UNUSED: u32 = u32::MAX;
-    let mut renumbered = vec![UNUSED; positions.len()];
-    let mut kept = Vec::with_capacity(positions.len());
-    for corner in triangles.iter_mut().flatten() {
-        let old = *corner as usize;
-        if renumbered[old] == UNUSED {
-            renumbered[old] = kept.len() as u32;
-            kept.push(positions[old]);
-        }
-        *corner = renumbered[old];
-    }
-    Mesh { positions: kept, triangles }
 }

@@ -1,17 +1,21 @@
 //! Puts a scene together from the objects of its file.
 
 use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::props::{Child, Props};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
-use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape};
-use crate::scene::{Bsdf, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape};
+use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture};
+use crate::scene::{Bitmap, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape};
 
 /// What the converters of single objects share.
 pub(super) struct Context<'a> {
     pub tree: &'a Tree,
     pub warnings: Vec<String>,
     pub media: Vec<Medium>,
+    /// Images by file, and whether they are raw.
+    pub images: HashMap<(PathBuf, bool), Arc<Bitmap>>,
     medium_ids: HashMap<ObjectId, MediumId>,
 }
 
@@ -37,7 +41,8 @@ impl<'a> Context<'a> {
 /// The scene that a tree describes.
 pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     let root = &tree.objects[0];
-    let mut context = Context { tree, warnings: Vec::new(), media: Vec::new(), medium_ids: HashMap::new() };
+    let (images, medium_ids) = (HashMap::new(), HashMap::new());
+    let mut context = Context { tree, warnings: Vec::new(), media: Vec::new(), images, medium_ids };
     let props = Props::new(tree, root);
     refuse_doubles(root)?;
 
@@ -71,7 +76,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     if let Some(child) = integrator_child {
         integrator::warn_about_media(&mut context, child);
     }
-    if !has_light(&shapes, &lights) {
+    if !has_light(&shapes, &lights, &context.media) {
         context.warnings.push(root.at.warning("the scene has no light: the picture will be black"));
     }
     let scene = Scene {
@@ -86,16 +91,17 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     Ok(Loaded { scene, warnings: context.warnings })
 }
 
-/// Media and BSDFs that stand directly in the scene are there to be referred to. They are checked even if nobody does,
+/// Media, BSDFs and textures that stand directly in the scene are there to be referred to. They are checked even if nobody does,
 /// since a fault in them is one that waits.
-fn declarations(context: &mut Context<'_>, props: &Props<'_>) -> Result<(), SceneError> {
+fn declarations<'a>(context: &mut Context<'a>, props: &Props<'a>) -> Result<(), SceneError> {
     let used: HashSet<ObjectId> =
         context.tree.objects.iter().skip(1).flat_map(targets).map(|(_, target)| target).collect();
-    for kind in [Kind::Medium, Kind::Bsdf, Kind::Phase] {
+    for kind in [Kind::Medium, Kind::Bsdf, Kind::Phase, Kind::Texture] {
         for child in props.children(kind) {
             match kind {
                 Kind::Medium => drop(medium::convert(context, child)?),
-                Kind::Bsdf => drop::<Bsdf>(bsdf::convert(context, child)?),
+                Kind::Bsdf => drop(bsdf::convert(context, child)?),
+                Kind::Texture => drop(texture::convert(context, child)?),
                 _ => drop(medium::phase(context, child)?),
             }
             if !used.contains(&child.id) {
@@ -125,11 +131,9 @@ fn refuse_doubles(root: &Object) -> Result<(), SceneError> {
     }
 }
 
-fn has_light(shapes: &[Shape], lights: &[Light]) -> bool {
+fn has_light(shapes: &[Shape], lights: &[Light], media: &[Medium]) -> bool {
     let shines = |radiance: glam::DVec3| radiance.max_element() > 0.0;
     shapes.iter().any(|shape| shape.emission.is_some_and(shines))
-        || lights.iter().any(|light| match *light {
-            Light::Point { intensity, .. } => shines(intensity),
-            Light::Constant { radiance } => shines(radiance),
-        })
+        || lights.iter().any(Light::shines)
+        || media.iter().any(|medium| shines(medium.emission))
 }

@@ -3,12 +3,12 @@
 use glam::DVec3;
 
 use super::build::Context;
-use super::props::{Child, Given, unknown_plugin};
+use super::props::{Child, Given, Props, unknown_plugin};
 use super::tree::Kind;
 use crate::scene::{Medium, Phase, SceneError};
 
 const TYPES: [&str; 1] = ["homogeneous"];
-const PHASE_TYPES: [&str; 2] = ["isotropic", "hg"];
+const PHASE_TYPES: [&str; 5] = ["isotropic", "hg", "rayleigh", "blendphase", "tabphase"];
 
 /// A homogeneous medium, from `sigma_t` and `albedo` as in Mitsuba 3 or from `sigma_s` and `sigma_a` as in 0.6.
 pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Medium, SceneError> {
@@ -18,7 +18,7 @@ pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Med
     let props = context.props(child);
     let (sigma_t, albedo) = (props.color("sigma_t")?, props.color("albedo")?);
     let (sigma_s, sigma_a) = (props.color("sigma_s")?, props.color("sigma_a")?);
-    let scale = props.float("scale")?;
+    let (scale, emission) = (props.float("scale")?, props.emission("emission")?);
     // Choices of Mitsuba's estimators; the medium is the same.
     props.ignore_boolean("has_spectral_extinction")?;
     props.ignore_boolean("sample_emitters")?;
@@ -61,12 +61,13 @@ pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Med
     if !sigma_t.is_finite() {
         return Err(child.object.at.error("the extinction coefficient overflows: scale times sigma_t is infinite"));
     }
+    let emission = coefficient("emission", emission)?.unwrap_or_default();
     let phase = match phase {
         Some(child) => self::phase(context, child)?,
         None => Phase::Isotropic,
     };
     let name = child.object.id.clone().unwrap_or_else(|| format!("medium at {}", child.object.at));
-    Ok(Medium { name, sigma_t, albedo, phase })
+    Ok(Medium { name, sigma_t, albedo, phase, emission })
 }
 
 /// A phase function.
@@ -83,10 +84,45 @@ pub(super) fn phase<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Phase
             }
             Phase::HenyeyGreenstein { g: g.map_or(0.8, |given| given.value) }
         }
+        "rayleigh" => Phase::Rayleigh,
+        "blendphase" => blend(context, child, &props)?,
+        "tabphase" => {
+            let values = props.string("values")?.ok_or_else(|| {
+                child.object.at.error("<phase type=\"tabphase\"> needs <string name=\"values\" value=\"…\"/>")
+            })?;
+            let table = super::values::floats(&values.value).map_err(|message| values.at.error(message))?;
+            // Mitsuba's table and ours have the same sign: the last value is that of straight on.
+            Phase::tabulated(table).ok_or_else(|| {
+                values.at.error("values must be at least two numbers that are not negative, with one greater than 0")
+            })?
+        }
         _ => return Err(unknown_plugin(child.object, &PHASE_TYPES)),
     };
     props.finish()?;
     Ok(phase)
+}
+
+/// A mixture of two phase functions, in the order of the file.
+fn blend<'a>(context: &Context<'a>, child: Child<'a>, props: &Props<'a>) -> Result<Phase, SceneError> {
+    let weight = props.float("weight")?.ok_or_else(|| {
+        child
+            .object
+            .at
+            .error("<phase type=\"blendphase\"> needs <float name=\"weight\" value=\"…\"/>, the share of the second")
+    })?;
+    if !(0.0..=1.0).contains(&weight.value) {
+        return Err(weight.at.error(format!("weight is {}; it must lie between 0 and 1", weight.value)));
+    }
+    let inside = props.children(Kind::Phase);
+    let [a, b] = inside[..] else {
+        let count = inside.len();
+        return Err(child
+            .object
+            .at
+            .error(format!("<phase type=\"blendphase\"> holds {count} phase functions; it must hold two")));
+    };
+    let [a, b] = [phase(context, a)?, phase(context, b)?].map(Box::new);
+    Ok(Phase::Blend { weight: weight.value, a, b })
 }
 
 fn coefficient(name: &str, given: Option<Given<DVec3>>) -> Result<Option<DVec3>, SceneError> {

@@ -36,11 +36,39 @@ pub(super) struct Child<'a> {
     pub at: &'a Location,
 }
 
+/// A colour, or the texture that it comes from.
+pub(super) enum Colored<'a> {
+    Constant(Given<'a, DVec3>),
+    Texture(Child<'a>),
+}
+
+/// A number, or a name that stands for one.
+pub(super) enum NumberOrName {
+    Number(f64),
+    Name(String),
+}
+
+/// The three channels of a value; `constant` is what a spectrum of 1 becomes.
+fn color_of(value: &Value, constant: DVec3) -> Option<DVec3> {
+    match *value {
+        Value::Rgb(v) => Some(v),
+        Value::Float(v) => Some(DVec3::splat(v)),
+        Value::Integer(v) => Some(DVec3::splat(v as f64)),
+        Value::Spectrum(v) => Some(v * constant),
+        _ => None,
+    }
+}
+
 impl<'a> Props<'a> {
     /// Nothing has been asked for yet.
     pub fn new(tree: &'a Tree, object: &'a Object) -> Self {
         let used = object.properties.iter().map(|_| Cell::new(false)).collect();
         Props { tree, object, used, names: RefCell::default(), kinds: RefCell::default() }
+    }
+
+    /// Whether the object has a property, without asking for it.
+    pub fn has(&self, name: &str) -> bool {
+        self.object.properties.iter().any(|property| property.name.as_deref() == Some(name))
     }
 
     /// Where the object stands.
@@ -137,14 +165,31 @@ impl<'a> Props<'a> {
         self.spectrum(name, DVec3::new(1.204_794, 0.948_291, 0.908_916))
     }
 
-    fn spectrum(&self, name: &'static str, constant: DVec3) -> Result<Option<Given<'a, DVec3>>, SceneError> {
-        self.typed(name, "<rgb>, <float> or <spectrum>", |value| match *value {
-            Value::Rgb(v) => Some(v),
-            Value::Float(v) => Some(DVec3::splat(v)),
-            Value::Integer(v) => Some(DVec3::splat(v as f64)),
-            Value::Spectrum(v) => Some(v * constant),
+    /// A quantity of each channel, or a texture that has it.
+    pub fn color_or_texture(&self, name: &'static str) -> Result<Option<Colored<'a>>, SceneError> {
+        if let Some(property) = self.find(name)
+            && let Value::Object(id) = property.value
+            && self.tree.objects[id].kind == Kind::Texture
+        {
+            let object = &self.tree.objects[id];
+            return Ok(Some(Colored::Texture(Child { id, object, name: Some(name), at: &property.at })));
+        }
+        let given = self.typed(name, "<rgb>, <float>, <spectrum> or <texture>", |value| color_of(value, DVec3::ONE))?;
+        Ok(given.map(Colored::Constant))
+    }
+
+    /// A refractive index: a number, or the name of a material.
+    pub fn number_or_name(&self, name: &'static str) -> Result<Option<Given<'a, NumberOrName>>, SceneError> {
+        self.typed(name, "<float> or <string>", |value| match value {
+            Value::Float(v) => Some(NumberOrName::Number(*v)),
+            Value::Integer(v) => Some(NumberOrName::Number(*v as f64)),
+            Value::String(v) => Some(NumberOrName::Name(v.clone())),
             _ => None,
         })
+    }
+
+    fn spectrum(&self, name: &'static str, constant: DVec3) -> Result<Option<Given<'a, DVec3>>, SceneError> {
+        self.typed(name, "<rgb>, <float> or <spectrum>", |value| color_of(value, constant))
     }
 
     /// Accepts a property that does not change the picture.

@@ -5,6 +5,7 @@ use glam::{DMat4, DVec2};
 use super::build::Context;
 use super::film;
 use super::props::{Child, Given, Props, unknown_plugin};
+use super::transform::rigid;
 use super::tree::Kind;
 use crate::scene::{Camera, Film, SceneError};
 
@@ -45,7 +46,7 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
     let offset = |name| Ok::<f64, SceneError>(props.float(name)?.map_or(0.0, |given| given.value));
     let principal_point_offset = DVec2::new(offset("principal_point_offset_x")?, offset("principal_point_offset_y")?);
     let to_world = match props.transform("to_world")? {
-        Some(given) => rigid(given)?,
+        Some(given) => rigid(given, "the camera's to_world")?,
         None => DMat4::IDENTITY,
     };
     // Nothing moves and a pinhole has no focus, so these do not change the picture.
@@ -121,24 +122,4 @@ fn clip_planes(props: &Props, child: Child) -> Result<(f64, f64), SceneError> {
         return Err(at.error(format!("near_clip is {near} and far_clip {far}; they must be 0 < near_clip < far_clip")));
     }
     Ok((near, far))
-}
-
-/// Takes a uniform scale, which does not change the picture, out of a camera's matrix. Mitsuba refuses all scales; the
-/// tolerance is the 1e-3 with which it looks for them.
-fn rigid(given: Given<DMat4>) -> Result<DMat4, SceneError> {
-    const TOLERANCE: f64 = 1e-3;
-    let m = given.value;
-    let axes = [m.x_axis.truncate(), m.y_axis.truncate(), m.z_axis.truncate()];
-    let scale = (axes[0].length() * axes[1].length() * axes[2].length()).cbrt();
-    let off = |value: f64| value.is_nan() || value.abs() > TOLERANCE;
-    let stretched = axes.iter().any(|axis| off(axis.length() / scale - 1.0));
-    let sheared = [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| off(axes[i].dot(axes[j]) / (scale * scale)));
-    if stretched || sheared {
-        return Err(given.at.error(
-            "the camera's to_world stretches or shears; only rotations, translations, mirrors and a uniform scale \
-             are accepted",
-        ));
-    }
-    let [x, y, z] = axes.map(|axis| (axis / scale).extend(0.0));
-    Ok(DMat4::from_cols(x, y, z, m.w_axis))
 }

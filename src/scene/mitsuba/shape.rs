@@ -16,8 +16,8 @@ struct Outline {
     /// `None` if nothing is left of a mesh.
     geometry: Option<Geometry>,
     name: String,
-    /// Mitsuba would interpolate normals over the triangles.
-    smooth: bool,
+    /// `to_world` turns or mirrors a sphere, which has texture coordinates but no axes of its own.
+    turned: bool,
     /// How a mirroring transform changed the normals, if it did in a way that is worth a warning.
     mirrored: Option<&'static str>,
 }
@@ -48,13 +48,19 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
     };
     props.finish()?;
 
-    if outline.smooth && bsdf != Bsdf::Null {
-        let text = "flat normals are used, where Mitsuba interpolates vertex normals; add \
-                    <boolean name=\"face_normals\" value=\"true\"/> for the same picture in both";
-        context.warnings.push(child.object.at.warning(text));
+    if let (Some(why), Some(geometry)) = (bsdf.needs_uvs(), &outline.geometry) {
+        let text = match geometry {
+            Geometry::Mesh(mesh) if mesh.uvs.is_empty() => "but its mesh has no texture coordinates (vt)",
+            Geometry::Sphere { .. } if outline.turned => {
+                "but its to_world turns or mirrors it; only spheres that are moved and scaled can have one"
+            }
+            _ => "",
+        };
+        if !text.is_empty() {
+            return Err(child.object.at.error(format!("the BSDF of this shape has {why}, {text}")));
+        }
     }
-    let sides_matter =
-        emission.is_some() || boundary.is_some() || matches!(bsdf, Bsdf::Diffuse { two_sided: false, .. });
+    let sides_matter = emission.is_some() || boundary.is_some() || bsdf.sides_differ();
     if let Some(text) = outline.mirrored.filter(|_| sides_matter) {
         context.warnings.push(child.object.at.warning(text));
     }
@@ -74,8 +80,8 @@ fn default_bsdf<'a>(
                     boundary needs <bsdf type=\"null\"/>";
         context.warnings.push(child.object.at.warning(text));
     }
-    let reflectance = if emission.is_some() { DVec3::ZERO } else { bsdf::DEFAULT_REFLECTANCE };
-    Bsdf::Diffuse { reflectance, two_sided: false }
+    let reflectance = if emission.is_some() { 0.0 } else { bsdf::DEFAULT_REFLECTANCE };
+    Bsdf::Diffuse { reflectance: DVec3::splat(reflectance).into(), two_sided: false }
 }
 
 /// The media named `interior` and `exterior`.
@@ -142,7 +148,7 @@ fn sphere(props: &Props, flip: bool) -> Result<Outline, SceneError> {
     Ok(Outline {
         geometry: Some(Geometry::Sphere { center, radius, flipped: flip != mirrored }),
         name: "sphere".to_owned(),
-        smooth: false,
+        turned: !(linear * scale.recip()).abs_diff_eq(DMat3::IDENTITY, TOLERANCE),
         mirrored: mirrored.then_some(
             "to_world mirrors this sphere, which turns its normals around, as in Mitsuba; use flip_normals to turn \
              them back",
@@ -165,7 +171,7 @@ fn analytic(props: &Props, plugin: &str, flip: bool) -> Result<Outline, SceneErr
     Ok(Outline {
         geometry: Some(Geometry::Mesh(mesh)),
         name: plugin.to_owned(),
-        smooth: false,
+        turned: false,
         mirrored: mirrored.then_some(
             "to_world mirrors this shape; its normals stay on the side that Mitsuba emits light from, where Mitsuba \
              swaps interior and exterior media",
@@ -184,8 +190,7 @@ fn triangles<'a>(
         .string("filename")?
         .ok_or_else(|| at.error("<shape type=\"obj\"> needs <string name=\"filename\" value=\"…\"/>"))?;
     let face_normals = props.boolean("face_normals")?.is_some_and(|given| given.value);
-    // There are no textures.
-    props.ignore_boolean("flip_tex_coords")?;
+    let flip_uvs = props.boolean("flip_tex_coords")?.is_none_or(|given| given.value);
     let to_world = to_world(props)?;
 
     let path = source::find(&filename.value, child.object.folders.iter());
@@ -221,11 +226,26 @@ fn triangles<'a>(
         let text = format!("{dropped} of {total} triangles of the mesh {shown} have no area and are left out");
         context.warnings.push(filename.at.warning(text));
     }
-    let smooth = !empty && !face_normals && (read.has_normals || !mesh.is_flat());
+    if read.missing_uvs > 0 {
+        let text = format!(
+            "{} vertices of the mesh {shown} have no texture coordinates; they get those of a corner of the image",
+            read.missing_uvs
+        );
+        context.warnings.push(filename.at.warning(text));
+    }
+    if flip_uvs {
+        mesh.uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);
+    }
+    if !face_normals {
+        mesh.complete_normals();
+    }
+    if face_normals || mesh.is_flat() {
+        mesh.normals.clear();
+    }
     Ok(Outline {
         geometry: (!empty).then_some(Geometry::Mesh(mesh)),
         name: filename.value,
-        smooth,
+        turned: false,
         mirrored: mirrors(&to_world).then_some(
             "to_world mirrors this mesh, which turns its normals around, as in Mitsuba; use flip_normals to turn them \
              back",

@@ -5,7 +5,7 @@ pub(super) fn did_you_mean<'a>(wrong: &str, names: impl Iterator<Item = &'a str>
     let limit = (wrong.chars().count() / 3).clamp(1, 3);
     let nearest = names.map(|name| (distance(wrong, name), name)).min();
     match nearest {
-        Some((d, name)) if d <= limit && d > 0 => format!("; did you mean \"{name}\"?"),
+        Some((d, name)) if d <= limit && name != wrong => format!("; did you mean \"{name}\"?"),
         _ => String::new(),
     }
 }
@@ -48,6 +48,8 @@ mod tests {
     fn only_near_names_are_suggested() {
         let names = ["fov", "to_world", "near_clip"];
         assert_eq!(did_you_mean("toworld", names.into_iter()), "; did you mean \"to_world\"?");
+        assert_eq!(did_you_mean("FOV", names.into_iter()), "; did you mean \"fov\"?");
+        assert_eq!(did_you_mean("fov", names.into_iter()), "");
         assert_eq!(did_you_mean("aperture", names.into_iter()), "");
     }
 }

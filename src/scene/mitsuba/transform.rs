@@ -2,8 +2,9 @@
 
 use glam::{DMat3, DMat4, DVec3};
 
+use super::props::Given;
 use super::values;
-use crate::scene::look_at;
+use crate::scene::{SceneError, look_at};
 
 /// The operations, as their tags are named. `look_at` is what `lookAt` becomes.
 pub(super) const OPERATIONS: [&str; 6] = ["translate", "rotate", "scale", "matrix", "lookat", "look_at"];
@@ -91,4 +92,23 @@ fn any_perpendicular(n: DVec3) -> DVec3 {
     let sign = 1f64.copysign(n.z);
     let a = -1.0 / (sign + n.z);
     DVec3::new(1.0 + sign * n.x * n.x * a, sign * n.x * n.y * a, -sign * n.x)
+}
+
+/// Takes a uniform scale out of the matrix of something that has no size: a camera (for which Mitsuba refuses all scales; the
+/// tolerance is the 1e-3 with which it looks for them), a spot, an environment. `what` is its name in messages.
+pub(super) fn rigid(given: Given<DMat4>, what: &str) -> Result<DMat4, SceneError> {
+    const TOLERANCE: f64 = 1e-3;
+    let m = given.value;
+    let axes = [m.x_axis.truncate(), m.y_axis.truncate(), m.z_axis.truncate()];
+    let scale = (axes[0].length() * axes[1].length() * axes[2].length()).cbrt();
+    let off = |value: f64| value.is_nan() || value.abs() > TOLERANCE;
+    let stretched = axes.iter().any(|axis| off(axis.length() / scale - 1.0));
+    let sheared = [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| off(axes[i].dot(axes[j]) / (scale * scale)));
+    if stretched || sheared {
+        return Err(given.at.error(format!(
+            "{what} stretches or shears; only rotations, translations, mirrors and a uniform scale are accepted"
+        )));
+    }
+    let [x, y, z] = axes.map(|axis| (axis / scale).extend(0.0));
+    Ok(DMat4::from_cols(x, y, z, m.w_axis))
 }

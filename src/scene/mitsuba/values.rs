@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::scene::bitmap::srgb_to_linear;
+
 /// A finite number.
 pub(super) fn float(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
@@ -56,11 +58,6 @@ pub(super) fn rgb(text: &str) -> Result<DVec3, String> {
     let code = u32::from_str_radix(digits, 16).expect("six hexadecimal digits were checked");
     let channel = |shift: u32| srgb_to_linear(f64::from(code >> shift & 0xff) / 255.0);
     Ok(DVec3::new(channel(16), channel(8), channel(0)))
-}
-
-/// The inverse of sRGB's transfer function (IEC 61966-2-1).
-fn srgb_to_linear(v: f64) -> f64 {
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
 /// `camelCase` to `snake_case`, by Mitsuba's rule: an underscore goes where a capital follows a small letter.

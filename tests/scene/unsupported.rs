@@ -1,0 +1,76 @@
+//! What kernels cannot render yet is refused with its name before anything is rendered.
+
+use tyndall::pack::{PackError, Packed};
+
+use crate::{data, scene};
+
+fn refusal(body: &str) -> Option<String> {
+    match Packed::new(&scene(body), 0) {
+        Ok(_) => None,
+        Err(error @ PackError::Unsupported { .. }) => Some(error.to_string()),
+        Err(other) => panic!("{body}: {other}"),
+    }
+}
+
+#[test]
+fn nothing_is_left_out_silently() {
+    let shape = |bsdf: &str| format!(r#"<shape type="rectangle" id="thing">{bsdf}</shape>"#);
+    let inside = r#"<bsdf type="diffuse"/>"#;
+    for plugin in [
+        "dielectric",
+        "thindielectric",
+        "roughdielectric",
+        "conductor",
+        "roughconductor",
+        "plastic",
+        "roughplastic",
+        "mask",
+    ] {
+        let inside = if plugin == "mask" { inside } else { "" };
+        let text = refusal(&shape(&format!(r#"<bsdf type="{plugin}">{inside}</bsdf>"#)));
+        assert_eq!(text, Some(format!("the {plugin} BSDF of \"thing\" cannot be rendered yet")));
+    }
+    let checker = r#"<bsdf type="diffuse"><texture type="checkerboard" name="reflectance"/></bsdf>"#;
+    assert_eq!(refusal(&shape(checker)).unwrap(), "the texture of \"thing\" cannot be rendered yet");
+    assert_eq!(refusal(&shape(inside)), None);
+    let medium = |inside: &str| {
+        format!(
+            r#"<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="interior" id="fog">{inside}</medium></shape>"#
+        )
+    };
+    let hg = r#"<phase type="hg"/>"#;
+    assert_eq!(refusal(&medium(hg)), None);
+    for (inside, what) in [
+        (r#"<rgb name="emission" value="1"/>"#, "the emission"),
+        (r#"<phase type="rayleigh"/>"#, "the Rayleigh phase function"),
+        (
+            &format!(r#"<phase type="blendphase"><float name="weight" value="0.5"/>{hg}{hg}</phase>"#),
+            "the blended phase function",
+        ),
+        (r#"<phase type="tabphase"><string name="values" value="1 1"/></phase>"#, "the tabulated phase function"),
+    ] {
+        assert_eq!(refusal(&medium(inside)), Some(format!("{what} of \"fog\" cannot be rendered yet")));
+    }
+    let sky = r#"<emitter type="envmap"><string name="filename" value="textures/sky.exr"/></emitter>"#;
+    for (body, what) in [
+        (r#"<emitter type="spot"/>"#, "the spot"),
+        (r#"<emitter type="directional"/>"#, "the directional light"),
+        (sky, "the environment map"),
+    ] {
+        // The first emitter is the constant one that every scene of these tests has.
+        assert_eq!(refusal(body), Some(format!("{what} of \"emitter 2\" cannot be rendered yet")));
+    }
+}
+
+#[test]
+fn vertex_normals_are_not_used_yet() {
+    let warnings = |inside: &str| {
+        let body = format!(r#"<shape type="obj"><string name="filename" value="meshes/ball.obj"/>{inside}</shape>"#);
+        Packed::new(&scene(&body), 0).unwrap().warnings
+    };
+    let smooth = warnings("");
+    assert!(smooth.len() == 1 && smooth[0].starts_with("flat normals are used for \"meshes/ball.obj\""), "{smooth:?}");
+    assert_eq!(warnings(r#"<boolean name="face_normals" value="true"/>"#), [""; 0]);
+    assert_eq!(warnings(r#"<bsdf type="null"/>"#), [""; 0]);
+    assert!(data("meshes/ball.obj").exists());
+}
