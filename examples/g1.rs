@@ -8,7 +8,8 @@ fn main() {
     let spp: u32 = a[1].parse().unwrap();
     let sub: u32 = 6;
     let mut s = Scene::new(Camera::look_at(DVec3::new(0., 0., 7.4), DVec3::ZERO, DVec3::Y, 41.5), Film::new(128, 128));
-    let m = s.add_medium(Medium::new("m", DVec3::new(2.,3.5,6.), DVec3::new(0.9,0.571428571,0.25), Phase::Isotropic));
+    let m =
+        s.add_medium(Medium::new("m", DVec3::new(2., 3.5, 6.), DVec3::new(0.9, 0.571428571, 0.25), Phase::Isotropic));
     let mesh = |f: &str| {
         let (m, _) = tobj::load_obj(f, &tobj::LoadOptions { triangulate: true, ..Default::default() }).unwrap();
         let m = &m[0].mesh;
@@ -37,11 +38,19 @@ fn main() {
     let _ = sub;
     let t = std::time::Instant::now();
     let mut p = pack::Packed::new(&s, 1).unwrap();
-    let k = p.surfaces.len()-1;
+    let k = p.surfaces.len() - 1;
     use pack::layout as lay;
-    p.surfaces[k].flags = (lay::BSDF_DIELECTRIC << 8) | lay::SURFACE_ORIENTED; p.surfaces[k].eta=1.5; p.surfaces[k].specular=glam::Vec3::ONE; p.surfaces[k].transmittance=glam::Vec3::ONE;
-    if a.len()>4 { p.surfaces[k].alpha = a[4].parse().unwrap(); p.surfaces[k].flags |= lay::SURFACE_GGX; }
-    for t in &mut p.primitives { t.surface &= !lay::PRIMITIVE_BOUNDARY; }
+    p.surfaces[k].flags = (lay::BSDF_DIELECTRIC << 8) | lay::SURFACE_ORIENTED;
+    p.surfaces[k].eta = 1.5;
+    p.surfaces[k].specular = glam::Vec3::ONE;
+    p.surfaces[k].transmittance = glam::Vec3::ONE;
+    if a.len() > 4 {
+        p.surfaces[k].alpha = a[4].parse().unwrap();
+        p.surfaces[k].flags |= lay::SURFACE_GGX;
+    }
+    for t in &mut p.primitives {
+        t.surface &= !lay::PRIMITIVE_BOUNDARY;
+    }
     p.features = pack::features::Features::of(&s, &p);
     eprintln!(
         "pack {:?} {:?} prims {} nodes {} {:?}",

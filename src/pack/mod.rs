@@ -1,6 +1,6 @@
 //! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
 
-use crate::scene::{Bsdf, Geometry, MediumId, Phase, Scene, Shape, Texture};
+use crate::scene::{Bsdf, Geometry, MediumId, Phase, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
@@ -8,6 +8,7 @@ pub mod features;
 pub mod frame;
 pub mod layout;
 pub mod lights;
+pub mod material;
 pub mod nesting;
 pub mod sobol;
 mod support;
@@ -179,21 +180,14 @@ fn nearest_below_one(g: f64) -> f32 {
 }
 
 fn pack_surface(shape: &Shape, exterior: Option<MediumId>, media: &[Medium]) -> Surface {
-    let (reflectance, two_sided) = match &shape.bsdf {
-        Bsdf::Diffuse { reflectance: Texture::Constant(reflectance), two_sided } => (*reflectance, *two_sided),
-        // `support` has refused all others but `null`.
-        _ => (DVec3::ZERO, true),
-    };
     let (inside, outside) = match shape.boundary {
         Some(boundary) => (medium_index(boundary.interior), medium_index(exterior)),
         None => (0, 0),
     };
     Surface {
-        reflectance: reflectance.as_vec3(),
-        flags: if two_sided { SURFACE_TWO_SIDED } else { 0 },
         sigma_t_step: media[inside as usize].sigma_t - media[outside as usize].sigma_t,
         media: inside | outside << 16,
-        ..Surface::default()
+        ..material::pack(&shape.bsdf)
     }
 }
 

@@ -48,18 +48,17 @@ pub fn check(scene: &Scene) -> Result<Vec<String>, PackError> {
 }
 
 fn unsupported_bsdf(bsdf: &Bsdf) -> Option<&'static str> {
-    Some(match bsdf {
-        Bsdf::Null | Bsdf::Diffuse { reflectance: Texture::Constant(_), .. } => return None,
-        Bsdf::Diffuse { .. } => "the texture",
-        Bsdf::Dielectric { .. } => "the dielectric BSDF",
-        Bsdf::ThinDielectric { .. } => "the thindielectric BSDF",
-        Bsdf::RoughDielectric { .. } => "the roughdielectric BSDF",
-        Bsdf::Conductor { .. } => "the conductor BSDF",
-        Bsdf::RoughConductor { .. } => "the roughconductor BSDF",
-        Bsdf::Plastic { .. } => "the plastic BSDF",
-        Bsdf::RoughPlastic { .. } => "the roughplastic BSDF",
-        Bsdf::Mask { .. } => "the mask BSDF",
-    })
+    match bsdf {
+        Bsdf::RoughPlastic { .. } => Some("the roughplastic BSDF"),
+        Bsdf::Mask { .. } => Some("the mask BSDF"),
+        Bsdf::RoughDielectric { roughness, .. } | Bsdf::RoughConductor { roughness, .. }
+            if roughness.is_anisotropic() =>
+        {
+            Some("the anisotropic roughness")
+        }
+        _ if bsdf.textures().iter().any(|texture| !matches!(texture, Texture::Constant(_))) => Some("the texture"),
+        _ => None,
+    }
 }
 
 fn has_normals(shape: &Shape) -> bool {
