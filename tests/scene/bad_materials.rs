@@ -108,7 +108,7 @@ fn textures() {
             &bitmap("‸<transform name=\"to_uv\"><rotate x=\"1\" angle=\"45\"/></transform>"),
             &["out of itself", "rotations about z"],
         ),
-        (&with("mask", "opacity", sky), &["opacity is [1, 1, 0] in pixel", "between 0 and 1"][..1]),
+        (&with("mask", "opacity", sky), &["opacity is [2, 2, 0] in pixel (2, 0)", "between 0 and 1"][..]),
         (&with("mask", "opacity", checker), &["opacity is [3, 3, 3]; it must lie between 0 and 1"]),
         (
             "<texture type=\"checkerboard\" id=\"t\">‸<texture type=\"checkerboard\" name=\"color0\"/></texture>",
