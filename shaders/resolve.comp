@@ -7,7 +7,7 @@ layout(local_size_x = WORKGROUP) in;
 
 layout(set = 0, binding = 0, std430) readonly buffer Samples { vec4 samples[]; };
 // For each block and pixel of the dispatch: the sum and, behind it, the sum of squares.
-layout(set = 0, binding = 1, std430) writeonly buffer Sums { vec4 sums[]; };
+layout(set = 0, binding = 1, std430) buffer Sums { vec4 sums[]; };
 // For each block: samples that are NaN, infinite, negative; one unused.
 layout(set = 0, binding = 2, std430) buffer Invalid { uint invalid[]; };
 layout(set = 0, binding = 3, std430) readonly buffer ParamsBuffer { Params params; };

@@ -1,6 +1,7 @@
 // The tables of the scene and the buffers of the kernel: by address where the device can (lavapipe gathers these with vector
 // loads), else as storage buffers. Both forms have the same descriptors and the same push constants. Nodes and primitives,
-// which every step of a traversal loads, come in words of 64 bits: half as many gathers.
+// which every step of a traversal loads, come in words of 64 bits: half as many gathers. naga, which checks the second form,
+// knows no storage buffers that are only written.
 #include "lib/layout.glsl"
 #include "lib/features.glsl"
 
@@ -48,7 +49,7 @@ layout(set = 0, binding = 2, std430) readonly buffer Surfaces { Surface surfaces
 layout(set = 0, binding = 3, std430) readonly buffer Media { Medium media[]; };
 layout(set = 0, binding = 4, std430) readonly buffer Lights { Light lights[]; };
 layout(set = 0, binding = 5, std430) readonly buffer Points { uvec2 points[]; };
-layout(set = 0, binding = 6, std430) writeonly buffer Samples { vec4 samples[]; };
+layout(set = 0, binding = 6, std430) buffer Samples { vec4 samples[]; };
 layout(push_constant) uniform Push {
     uvec4 addresses[4];
     Dispatch work;

@@ -10,9 +10,15 @@ vec3 channel_weights(vec3 throughput) {
     return throughput / sum_components(throughput);
 }
 
-// The channel in which u in [0, 1) falls.
+// The channel in which u in [0, 1) falls; never one of probability 0, even where the others add up to a little less than 1.
 uint sample_channel(vec3 weights, float u) {
-    return (u < weights.x ? 0u : (u < weights.x + weights.y ? 1u : 2u));
+    if (u < weights.x) {
+        return 0u;
+    }
+    if (weights.y > 0.0 && (u < weights.x + weights.y || weights.z == 0.0)) {
+        return 1u;
+    }
+    return weights.z > 0.0 ? 2u : 0u;
 }
 
 // Distance at which the optical depth reaches tau; never, in vacuum.

@@ -35,6 +35,18 @@ sources! {
     "lib/rng.glsl",
     "lib/sampler.glsl",
     "lib/warp.glsl",
+    "units/bsdf.comp",
+    "units/bvh.comp",
+    "units/camera.comp",
+    "units/film.comp",
+    "units/light.comp",
+    "units/math.comp",
+    "units/medium.comp",
+    "units/phase.comp",
+    "units/ray.comp",
+    "units/rng.comp",
+    "units/sampler.comp",
+    "units/warp.comp",
 }
 
 /// A kernel before it is compiled.

@@ -134,27 +134,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn directions_are_those_of_the_sobol_crate() {
-        // Unscrambled, the table's sequence is Sobol's. sobol_burley scrambles, so compare what scrambling keeps: which pairs of
-        // points share their first digits.
-        let directions = directions();
-        let point = |index: u32, dimension: usize| {
-            (0..32).filter(|bit| index >> bit & 1 == 1).fold(0, |value, bit| value ^ directions[bit][dimension])
-        };
-        for dimension in 0..4 {
-            let oracle: Vec<u32> = (0..256)
-                .map(|index| (sobol_burley::sample(index, dimension as u32, 7) * 16_777_216.0) as u32)
-                .collect();
-            // The crate shuffles no indices in `sample`, so prefixes agree up to the scrambling.
-            for i in 0..256u32 {
-                for j in 0..i {
-                    let ours = (point(i, dimension) ^ point(j, dimension)).leading_zeros().min(16);
-                    let theirs = ((oracle[i as usize] ^ oracle[j as usize]) << 8).leading_zeros().min(16);
-                    assert_eq!(ours, theirs, "dimension {dimension}, points {i} and {j}");
-                }
-            }
-        }
-    }
 }

@@ -74,8 +74,8 @@ pub fn sphere_one_minus_cos(radius: f64, center_distance: f64) -> f64 {
     sin_squared / (1.0 + (1.0 - sin_squared).sqrt())
 }
 
-/// The outside of a sphere from outside, uniformly over its cone; the inside of a sphere with normals inwards from inside,
-/// uniformly over all directions.
+/// The outside of a sphere from outside, uniformly over its cone; the inside of a sphere with normals inwards from
+/// inside, uniformly over all directions.
 pub fn sample_sphere_light(light: &Light, point: DVec3, u: DVec2) -> LightSample {
     let to_center = light.origin - point;
     let radius = light.edge_1.x;

@@ -17,8 +17,8 @@ pub fn exp_minus_rgb(x: DVec3) -> DVec3 {
     DVec3::new(exp_minus(x.x), exp_minus(x.y), exp_minus(x.z))
 }
 
-/// Two unit vectors (tangent, bitangent) that make up a right-handed frame with the unit vector n: tangent × bitangent = n
-/// (Duff et al. 2017).
+/// Two unit vectors (tangent, bitangent) that make up a right-handed frame with the unit vector n: tangent × bitangent
+/// = n (Duff et al. 2017).
 pub fn orthonormal_frame(n: DVec3) -> (DVec3, DVec3) {
     let side = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (side + n.z);

@@ -9,14 +9,16 @@ pub fn channel_weights(throughput: DVec3) -> DVec3 {
     throughput / sum_components(throughput)
 }
 
-/// The channel in which u in \[0, 1) falls.
+/// The channel in which u in \[0, 1) falls; never one of probability 0, even where the others add up to a little less than 1.
 pub fn sample_channel(weights: DVec3, u: f64) -> u32 {
     if u < weights.x {
         0
-    } else if u < weights.x + weights.y {
+    } else if weights.y > 0.0 && (u < weights.x + weights.y || weights.z == 0.0) {
         1
-    } else {
+    } else if weights.z > 0.0 {
         2
+    } else {
+        0
     }
 }
 

@@ -1,6 +1,6 @@
-//! The renderer on the CPU, in double precision, for trust: one file for each file of `shaders/lib`, with the same names, the
-//! same random numbers and the same decisions. It follows the very paths of the kernels, so the two differ by rounding
-//! alone, but for the few paths where rounding turns a decision.
+//! The renderer on the CPU, in double precision, for trust: one file for each file of `shaders/lib`, with the same
+//! names, the same random numbers and the same decisions. It follows the very paths of the kernels, so the two differ
+//! by rounding alone, but for the few paths where rounding turns a decision.
 //!
 //! It shares no code with [`crate::gpu`]; both read the tables of [`crate::pack`].
 

@@ -1,5 +1,5 @@
-//! Mirror of `shaders/lib/path.glsl`: the estimator, a path as a coroutine that asks for one ray at a time. A path's life is
-//! described there. What the kernel leaves out where a scene does not need it is always here.
+//! Mirror of `shaders/lib/path.glsl`: the estimator, a path as a coroutine that asks for one ray at a time. A path's
+//! life is described there. What the kernel leaves out where a scene does not need it is always here.
 
 use super::bindings::{Light, Medium, Primitive, Tables};
 use super::bsdf::eval_diffuse;
@@ -149,8 +149,8 @@ pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     path
 }
 
-/// Weight of a direction found by scattering that light sampling finds with density `light_pdf`: the balance heuristic (Veach
-/// and Guibas 1995).
+/// Weight of a direction found by scattering that light sampling finds with density `light_pdf`: the balance heuristic
+/// (Veach and Guibas 1995).
 fn scattering_mis_weight(path: &Path, survival: f64, light_pdf: f64) -> f64 {
     let found = path.pdf * survival;
     if path.pdf == 0.0 || light_pdf == 0.0 { 1.0 } else { found / (found + light_pdf) }
@@ -406,7 +406,8 @@ struct Crossing {
 fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit: &mut Hit) {
     let primitive = tables.primitive(index);
     let Crossing { t, along_normal, barycentric } = crossing;
-    // Distances first, the primitive's index among equals: surfaces that coincide are met one after the other, none twice.
+    // Distances first, the primitive's index among equals: surfaces that coincide are met one after the other, none
+    // twice.
     let begins = t > path.t_min || (t == path.t_min && index > path.last && path.last != NONE);
     if path.shadow {
         let boundary = primitive.surface & PRIMITIVE_BOUNDARY != 0;

@@ -1,4 +1,5 @@
-//! Mirror of `shaders/lib/phase.glsl`: phase functions, \[1/sr\], with the convention for the sign of g that is stated there.
+//! Mirror of `shaders/lib/phase.glsl`: phase functions, \[1/sr\], with the convention for the sign of g that is stated
+//! there.
 
 use super::warp::INV_4PI;
 use glam::DVec3;

@@ -37,7 +37,8 @@ pub struct TriangleHit {
     pub barycentric: DVec2,
 }
 
-/// Whether a point lies to the left of a directed edge; points on the line belong to one side by the edge's direction alone.
+/// Whether a point lies to the left of a directed edge; points on the line belong to one side by the edge's direction
+/// alone.
 pub fn left_of(cross_product: f64, edge: DVec2) -> bool {
     let upward = edge.y > 0.0 || (edge.y == 0.0 && edge.x > 0.0);
     cross_product > 0.0 || (cross_product == 0.0 && upward)

@@ -46,8 +46,8 @@ pub fn average(image: &Image) -> DVec3 {
     image.iter().sum::<DVec3>() / image.len() as f64
 }
 
-/// Why two images of the same paths are not the same, if so: a share of at least 98 % of the pixels must agree to a relative
-/// 1e-3, and the means to 5e-3 (paths on which rounding turned a decision are independent samples).
+/// Why two images of the same paths are not the same, if so: a share of at least 98 % of the pixels must agree to a
+/// relative 1e-3, and the means to 5e-3 (paths on which rounding turned a decision are independent samples).
 pub fn compare(one: &Image, two: &Image) -> Result<f64, String> {
     let agrees = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().cmple(a.abs().max(b.abs()) * 1e-3 + 1e-9).all();
     let share = one.iter().zip(two).filter(|pair| agrees(*pair)).count() as f64 / one.len() as f64;
@@ -60,3 +60,15 @@ pub fn compare(one: &Image, two: &Image) -> Result<f64, String> {
     }
     Ok(share)
 }
+
+/// Independent estimates of what all pixels of a scene have in common: the pixels, dealt out to 64 batches. Each pixel has its own
+/// random shift of the sampler's points, while two samples of a pixel may share one and are no independent estimates.
+pub fn batches(scene: &tyndall::scene::Scene, seed: u32, spp: u32) -> Vec<DVec3> {
+    let image = on_device(&super::scenes::pack(scene, seed), spp);
+    assert!(image.len().is_multiple_of(BATCHES) && image.len() > BATCHES, "each batch has as many pixels");
+    let pixels = (image.len() / BATCHES) as f64;
+    (0..BATCHES).map(|first| image.iter().skip(first).step_by(BATCHES).sum::<DVec3>() / pixels).collect()
+}
+
+/// How many estimates [`batches`] returns.
+pub const BATCHES: usize = 64;

@@ -2,9 +2,13 @@
 
 #![allow(dead_code, reason = "each test file uses a part of this")]
 
+pub mod comparison;
 pub mod images;
+pub mod random;
 pub mod scenes;
 pub mod statistics;
+pub mod tolerances;
+pub mod truth;
 pub mod units;
 
 use std::sync::{Arc, OnceLock};

@@ -5,7 +5,7 @@ use tyndall::pack::Packed;
 use tyndall::scene::{Bsdf, Camera, Film, Geometry, Light, Medium, Mesh, Phase, Scene, Shape};
 
 /// The tables of a scene.
-pub fn pack(scene: &Scene, seed: u32, sample_count: u32) -> Packed {
+pub fn pack(scene: &Scene, seed: u32) -> Packed {
     Packed::new(scene, seed).expect("the scene can be packed")
 }
 
@@ -181,4 +181,28 @@ pub fn all() -> Vec<(&'static str, Scene)> {
         ("point light", point_light()),
         ("sphere light", sphere_light()),
     ]
+}
+
+/// A scene of one ray: all pixels look along it, from `origin` towards `target`.
+pub fn one_ray(origin: DVec3, target: DVec3, side: u32) -> Scene {
+    let up = if (target - origin).normalize().dot(DVec3::Y).abs() < 0.9 { DVec3::Y } else { DVec3::X };
+    Scene::new(Camera::look_at(origin, target, up, 1e-5), Film::new(side, side))
+}
+
+/// A torus about the y axis: closed, and not convex.
+pub fn torus(major: f64, minor: f64) -> Geometry {
+    let (around, across) = (24u32, 12u32);
+    let angle = |k: u32, of: u32| 2.0 * std::f64::consts::PI * f64::from(k) / f64::from(of);
+    let mut mesh = Mesh::default();
+    for i in 0..around {
+        for j in 0..across {
+            let (phi, theta) = (angle(i, around), angle(j, across));
+            let distance = major + minor * theta.cos();
+            mesh.positions.push(v(distance * phi.cos(), minor * theta.sin(), distance * phi.sin()));
+            let corner = |i: u32, j: u32| (i % around) * across + j % across;
+            let [a, b, c, d] = [corner(i, j), corner(i, j + 1), corner(i + 1, j + 1), corner(i + 1, j)];
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    Geometry::Mesh(mesh)
 }

@@ -1,0 +1,15 @@
+// Unit kernel of lib/film.glsl: (tile, pixel, width of the crop window, 0) in; (column, row, 0, 0) out.
+#version 460
+#include "lib/layout.glsl"
+#include "lib/film.glsl"
+
+layout(local_size_x = WORKGROUP) in;
+layout(set = 0, binding = 0, std430) readonly buffer Inputs { uvec4 inputs[]; };
+layout(set = 0, binding = 1, std430) buffer Outputs { uvec4 outputs[]; };
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i < uint(inputs.length())) {
+        outputs[i] = uvec4(tile_pixel(inputs[i].x, inputs[i].y, inputs[i].z), 0u, 0u);
+    }
+}

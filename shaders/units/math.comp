@@ -1,0 +1,18 @@
+// Unit kernel of lib/math.glsl: (u, x, 0, 0), (unit vector, 0) in; (-log(1 - u), exp(-x), 0, 0), tangent, bitangent out.
+#version 460
+#include "lib/math.glsl"
+
+layout(local_size_x = WORKGROUP) in;
+layout(set = 0, binding = 0, std430) readonly buffer Inputs { vec4 inputs[]; };
+layout(set = 0, binding = 1, std430) buffer Outputs { vec4 outputs[]; };
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i < uint(inputs.length()) / 2u) {
+        vec3 tangent, bitangent;
+        orthonormal_frame(inputs[2u * i + 1u].xyz, tangent, bitangent);
+        outputs[3u * i] = vec4(minus_log_1m(inputs[2u * i].x), exp_minus(inputs[2u * i].y), 0.0, 0.0);
+        outputs[3u * i + 1u] = vec4(tangent, 0.0);
+        outputs[3u * i + 2u] = vec4(bitangent, 0.0);
+    }
+}

@@ -1,0 +1,20 @@
+// Unit kernel of lib/sampler.glsl: (seed, pixel, set, index) and the table of points in; the set's numbers (bit patterns)
+// out.
+#version 460
+#include "lib/layout.glsl"
+#include "lib/sampler.glsl"
+
+layout(local_size_x = WORKGROUP) in;
+layout(set = 0, binding = 0, std430) readonly buffer Inputs { uvec4 inputs[]; };
+layout(set = 0, binding = 1, std430) readonly buffer Points { uvec2 points[]; };
+layout(set = 0, binding = 2, std430) buffer Outputs { uvec4 outputs[]; };
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i < uint(inputs.length())) {
+        uvec4 at = inputs[i];
+        uvec4 key = set_key(at.x, at.y, at.z, at.w);
+        uvec2 point = at.z < SOBOL_SETS ? points[point_index(at.z, at.w, key)] : uvec2(0u);
+        outputs[i] = floatBitsToUint(shifted_point(point, key));
+    }
+}

@@ -1,0 +1,44 @@
+//! What single precision makes of each function of the kernels, declared in one place.
+
+use super::comparison::{Comparison, Tolerance};
+
+/// What each function of the kernels promises. Single precision resolves 6e-8; sine and cosine of drivers have an
+/// absolute error of some 2e-7 (the Vulkan specification allows 2^-11); below 1e-37 drivers may flush to zero.
+const TOLERANCES: &[Tolerance] = &[
+    Tolerance { function: "minus_log_1m", relative: 3e-7, absolute: 0.0 },
+    Tolerance { function: "exp_minus", relative: 3e-7, absolute: 2e-38 },
+    Tolerance { function: "orthonormal_frame", relative: 3e-7, absolute: 0.0 },
+    Tolerance { function: "square_to_sphere", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "square_to_cosine_hemisphere", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "square_to_cone", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "warp densities", relative: 3e-6, absolute: 0.0 },
+    Tolerance { function: "intersect_triangle t", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "intersect_triangle barycentric", relative: 0.0, absolute: 5e-6 },
+    Tolerance { function: "intersect_sphere", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "nearest hit", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "channel_weights", relative: 4e-7, absolute: 0.0 },
+    Tolerance { function: "free_flight", relative: 2e-7, absolute: 0.0 },
+    Tolerance { function: "survival_probability", relative: 6e-7, absolute: 2e-38 },
+    Tolerance { function: "survival_weight", relative: 1e-6, absolute: 0.0 },
+    Tolerance { function: "scatter_weight", relative: 1.5e-6, absolute: 0.0 },
+    Tolerance { function: "1 - cos", relative: 6e-7, absolute: 0.0 },
+    Tolerance { function: "cos", relative: 0.0, absolute: 4e-7 },
+    Tolerance { function: "sin", relative: 6e-7, absolute: 0.0 },
+    Tolerance { function: "henyey_greenstein_from", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "scattered direction", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "eval_henyey_greenstein", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "eval_diffuse", relative: 2e-7, absolute: 0.0 },
+    Tolerance { function: "diffuse_pdf", relative: 2e-7, absolute: 0.0 },
+    Tolerance { function: "light direction", relative: 3e-6, absolute: 0.0 },
+    Tolerance { function: "light distance", relative: 3e-6, absolute: 0.0 },
+    Tolerance { function: "sphere light distance", relative: 4e-4, absolute: 0.0 },
+    Tolerance { function: "light weight", relative: 4e-6, absolute: 0.0 },
+    Tolerance { function: "light pdf", relative: 4e-6, absolute: 0.0 },
+    Tolerance { function: "alias rescaled", relative: 0.0, absolute: 1e-5 },
+    Tolerance { function: "camera_direction", relative: 3e-7, absolute: 0.0 },
+];
+
+/// A comparison with the tolerance of a function of the table.
+pub fn comparison(function: &str) -> Comparison {
+    Comparison::new(TOLERANCES, function)
+}

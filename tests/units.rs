@@ -1,0 +1,362 @@
+//! Each concept of the kernels against the reference, over ordinary and extreme inputs.
+
+mod common;
+
+use common::comparison::Comparison;
+use common::random::Random;
+use common::scenes::v;
+use common::tolerances::comparison;
+use common::units::{run, vec4, widen};
+use glam::{DVec2, DVec3, Vec3};
+use tyndall::pack::layout::{self, INFINITE_DISTANCE, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_TRIANGLE, Light};
+use tyndall::pack::lights::alias_table;
+use tyndall::pack::sobol;
+use tyndall::reference::{bindings, bsdf, camera, film, light, math, medium, phase, rng, sampler, warp};
+
+/// The numbers k/2²⁴ that matter most: both ends, powers of two, and some in between.
+fn units_in_question() -> Vec<f64> {
+    let last = (1u32 << 24) - 1;
+    let mut numbers: Vec<u32> = (0..300).chain(last - 300..=last).collect();
+    numbers.extend((0..24).flat_map(|bit| [(1 << bit) - 1, 1 << bit, last - (1 << bit)]));
+    let mut random = Random(1);
+    numbers.extend((0..4000).map(|_| random.bits() as u32 >> 8));
+    numbers.into_iter().map(|k| f64::from(k) / 16_777_216.0).collect()
+}
+
+fn narrow(vector: DVec3) -> [f32; 3] {
+    vector.as_vec3().to_array()
+}
+
+#[test]
+fn random_numbers_agree_to_the_last_bit() {
+    let mut random = Random(2);
+    let mut inputs: Vec<[u32; 4]> = (0..5000).map(|_| [0; 4].map(|_: u32| random.bits() as u32)).collect();
+    inputs.extend([[0; 4], [u32::MAX; 4], [1, 0, 0, 0], [0, 0, 0, 1]]);
+    let outputs: Vec<[u32; 4]> = run("rng", &inputs, &[], inputs.len(), 2 * inputs.len());
+    for (input, output) in inputs.iter().zip(outputs.chunks(2)) {
+        assert_eq!(output[0], rng::pcg4d(*input), "pcg4d({input:?})");
+        let numbers = rng::to_unit(*input).to_array();
+        assert_eq!(output[1].map(f32::from_bits).map(f64::from), numbers, "to_unit({input:?})");
+        assert!(numbers.iter().all(|number| (0.0..1.0).contains(number)));
+        assert_ne!(output[0], rng::pcg4d([input[0] ^ 1, input[1], input[2], input[3]]), "a bit of the input is lost");
+    }
+}
+
+#[test]
+fn sets_of_the_sampler_agree_to_the_last_bit() {
+    let mut random = Random(3);
+    let table = sobol::points();
+    let inputs: Vec<[u32; 4]> = (0..5000)
+        .map(|_| {
+            let index = random.bits() as u32 >> (random.bits() % 32);
+            [random.bits() as u32, random.bits() as u32, (random.bits() % 12) as u32, index]
+        })
+        .collect();
+    let outputs: Vec<[u32; 4]> = run("sampler", &inputs, &[bytemuck::cast_slice(&table)], inputs.len(), inputs.len());
+    let expected = |[seed, pixel, set, index]: [u32; 4]| {
+        let key = sampler::set_key(seed, pixel, set, index);
+        let point =
+            if set < sobol::SOBOL_SETS { table[sampler::point_index(set, index, key) as usize] } else { [0; 2] };
+        sampler::shifted_point(point, key).to_array()
+    };
+    for (input, output) in inputs.iter().zip(outputs) {
+        let found = output.map(f32::from_bits).map(f64::from);
+        assert_eq!(found, expected(*input), "{input:?}");
+        assert!(found.iter().all(|number| (0.0..1.0).contains(number)), "{input:?}");
+        let neighbour = [input[0], input[1] ^ 1, input[2], input[3]];
+        assert_ne!(found, expected(neighbour), "pixels share their numbers");
+    }
+}
+
+#[test]
+fn elementary_functions() {
+    let mut random = Random(4);
+    let mut inputs = Vec::new();
+    let extremes = [0.0, 1e-30, 86.9, 87.0, 87.4, 88.0, 200.0, 1e9, 1e30, f64::INFINITY];
+    for (k, u) in units_in_question().into_iter().enumerate() {
+        let x = if k < extremes.len() { extremes[k] } else { random.log_between(1e-12, 87.0) };
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Z, v(1e-4, 0.0, -1.0), v(0.0, 1e-20, -1.0)];
+        let n = if k < axes.len() { axes[k] } else { random.direction() };
+        inputs.extend([vec4(&[u, x]), vec4(&n.to_array())]);
+    }
+    let outputs: Vec<[f32; 4]> = run("math", &inputs, &[], inputs.len() / 2, inputs.len() / 2 * 3);
+    let mut log = comparison("minus_log_1m");
+    let mut exp = comparison("exp_minus");
+    let mut frame = comparison("orthonormal_frame");
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
+        let [u, x] = [input[0][0], input[0][1]].map(f64::from);
+        log.scalar(u, output[0][0], math::minus_log_1m(u));
+        // What lies below the smallest normal number is 0.
+        exp.scalar(x, output[0][1], math::exp_minus(x));
+        let n = widen(&input[1][..3]);
+        let (tangent, bitangent) = math::orthonormal_frame(n);
+        frame.vector(n, &output[1][..3], tangent);
+        frame.vector(n, &output[2][..3], bitangent);
+        assert!((tangent.cross(bitangent) - n).length() < 1e-6, "the frame of {n} is not right-handed");
+    }
+    log.finish();
+    exp.finish();
+    frame.finish();
+}
+
+#[test]
+fn warps() {
+    let mut random = Random(5);
+    let inputs: Vec<[f32; 4]> =
+        units_in_question().into_iter().map(|u| vec4(&[u, random.unit(), random.log_between(1e-12, 2.0)])).collect();
+    let outputs: Vec<[f32; 4]> = run("warp", &inputs, &[], inputs.len(), 3 * inputs.len());
+    let names = ["square_to_sphere", "square_to_cosine_hemisphere", "square_to_cone"];
+    let mut directions = names.map(comparison);
+    let mut densities = comparison("warp densities");
+    for (input, output) in inputs.iter().zip(outputs.chunks(3)) {
+        let [x, y, m, _] = input.map(f64::from);
+        let u = DVec2::new(x, y);
+        let expected = [warp::square_to_sphere(u), warp::square_to_cosine_hemisphere(u), warp::square_to_cone(u, m)];
+        let pdfs = [
+            warp::square_to_sphere_pdf(),
+            warp::square_to_cosine_hemisphere_pdf(f64::from(output[1][2])),
+            warp::square_to_cone_pdf(m),
+        ];
+        for k in 0..3 {
+            directions[k].vector(format!("{x}, {y}, {m}"), &output[k][..3], expected[k]);
+            densities.scalar(format!("{} {x}, {y}, {m}", names[k]), output[k][3], pdfs[k]);
+        }
+    }
+    directions.into_iter().for_each(Comparison::finish);
+    densities.finish();
+}
+
+#[test]
+fn media() {
+    let mut random = Random(9);
+    let mut inputs = Vec::new();
+    for (k, u) in units_in_question().into_iter().enumerate() {
+        let depth = random.log_between(1e-12, 1e8);
+        let throughput =
+            v(random.log_between(1e-6, 10.0), random.log_between(1e-6, 10.0), random.log_between(1e-6, 10.0));
+        // The channel that the flight was sampled in has a depth below 17; the others have any.
+        let deep = [random.log_between(1e-12, 16.6), random.log_between(1e-12, 1e8), random.log_between(1e-12, 1e8)];
+        let tau = [0, 1, 2].map(|channel| deep[(channel + k) % 3]);
+        let sigma = [0; 3].map(|_| if random.unit() < 0.1 { 0.0 } else { random.log_between(1e-6, 1e6) });
+        let sigma = if sigma[(3 - k % 3) % 3] == 0.0 { [1.0; 3] } else { sigma };
+        let albedo = [random.unit(), random.unit(), 1.0];
+        inputs.push(vec4(&[u, math::minus_log_1m(u), if k % 50 == 0 { 0.0 } else { depth }]));
+        inputs.extend([vec4(&throughput.to_array()), vec4(&tau), vec4(&sigma), vec4(&albedo)]);
+    }
+    let count = inputs.len() / 5;
+    let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], count, 4 * count);
+    let names = ["channel_weights", "free_flight", "survival_probability", "survival_weight", "scatter_weight"];
+    let [mut weights, mut flight, mut probability, mut survival, mut scatter] = names.map(comparison);
+    for (input, output) in inputs.chunks(5).zip(outputs.chunks(4)) {
+        let [u, tau_one, sigma_one, _] = input[0].map(f64::from);
+        let [throughput, tau, sigma_t, albedo] = [1, 2, 3, 4].map(|k| widen(&input[k][..3]));
+        let expected = medium::channel_weights(throughput);
+        let case = format!("{input:?}");
+        // Where u lies at the very border of two channels, either is right.
+        let border = [expected.x, expected.x + expected.y].iter().any(|edge| (u - edge).abs() < 1e-6);
+        assert!(border || f64::from(output[0][0]) == f64::from(medium::sample_channel(expected, u)), "{case}");
+        flight.scalar(&case, output[0][1], medium::free_flight(tau_one, sigma_one));
+        probability.scalar(&case, output[0][2], medium::survival_probability(expected, tau));
+        weights.vector(&case, &output[1][..3], expected);
+        survival.vector(&case, &output[2][..3], medium::survival_weight(expected, tau));
+        scatter.vector(&case, &output[3][..3], medium::scatter_weight(expected, tau, sigma_t, albedo));
+    }
+    assert!(outputs.iter().flatten().all(|number| number.abs() <= INFINITE_DISTANCE), "a weight is not finite");
+    [weights, flight, probability, survival, scatter].into_iter().for_each(Comparison::finish);
+}
+
+#[test]
+fn phase_functions() {
+    let mut random = Random(10);
+    let mut inputs = Vec::new();
+    let magnitudes = [1e-8, 1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 0.5, 0.75, 0.9, 0.99, 0.999, 0.9999, 0.99999, 1.0 - 1e-6];
+    for g in magnitudes.into_iter().flat_map(|g| [g, -g]).chain([0.0]) {
+        for u in units_in_question().into_iter().step_by(3) {
+            inputs.extend([vec4(&[g, u, random.unit()]), vec4(&random.direction().to_array())]);
+        }
+    }
+    let count = inputs.len() / 2;
+    let outputs: Vec<[f32; 4]> = run("phase", &inputs, &[], count, 2 * count);
+    let names = ["1 - cos", "cos", "sin", "henyey_greenstein_from", "scattered direction", "eval_henyey_greenstein"];
+    let mut functions = names.map(comparison);
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(2)) {
+        let [g, u, turn, _] = input[0].map(f64::from);
+        let before = widen(&input[1][..3]);
+        let case = format!("g = {g}, u = {u}");
+        let angle = phase::sample_henyey_greenstein(g, u);
+        functions[0].scalar(&case, output[0][0], angle.one_minus_cos);
+        functions[1].scalar(&case, output[0][1], angle.cos_theta);
+        functions[2].scalar(&case, output[0][2], angle.sin_theta);
+        functions[3].scalar(&case, output[0][3], phase::henyey_greenstein_from(g, angle.one_minus_cos));
+        let local = warp::from_polar(angle.cos_theta, angle.sin_theta, turn);
+        functions[4].vector(&case, &output[1][..3], math::from_frame(before, local));
+        // Of the direction that the kernel found: rounding it is not an error of the function.
+        let after = widen(&output[1][..3]);
+        functions[5].scalar(&case, output[1][3], phase::eval_henyey_greenstein(g, before, after));
+    }
+    functions.into_iter().for_each(Comparison::finish);
+}
+
+#[test]
+fn surfaces() {
+    let mut random = Random(11);
+    let mut inputs: Vec<[f32; 4]> = vec![vec4(&[0.0, 1.0, -1.0, 1e-30])];
+    inputs.extend((0..500).map(|_| [0.0; 4].map(|_: f32| random.between(-1.0, 1.0) as f32)));
+    let outputs: Vec<[f32; 4]> = run("bsdf", &inputs, &[], inputs.len(), 2 * inputs.len());
+    let [mut eval, mut pdf] = ["eval_diffuse", "diffuse_pdf"].map(comparison);
+    for (input, output) in inputs.iter().zip(outputs.chunks(2)) {
+        for k in 0..4 {
+            let cosine = f64::from(input[k]);
+            eval.scalar(cosine, output[0][k], bsdf::eval_diffuse(cosine));
+            pdf.scalar(cosine, output[1][k], bsdf::diffuse_pdf(cosine));
+        }
+    }
+    eval.finish();
+    pdf.finish();
+}
+
+/// One light of each kind, near the origin.
+fn lights() -> Vec<Light> {
+    let plane = |kind, normal: Vec3, area| Light {
+        origin: Vec3::new(-0.3, 0.9, -0.2),
+        kind,
+        edge_1: Vec3::new(0.6, 0.0, 0.0),
+        edge_2: Vec3::new(0.1, 0.0, 0.5),
+        area,
+        normal,
+        radiance: Vec3::new(3.0, 2.0, 1.0),
+        ..Light::default()
+    };
+    let sphere = |center: Vec3, radius, side| Light {
+        origin: center,
+        kind: LIGHT_SPHERE,
+        edge_1: Vec3::new(radius, side, 0.0),
+        radiance: Vec3::new(1.0, 5.0, 0.0),
+        ..Light::default()
+    };
+    let point = Light { kind: LIGHT_POINT, origin: Vec3::new(0.1, 0.7, 0.2), radiance: Vec3::ONE, ..Light::default() };
+    let mut lights = vec![
+        plane(LIGHT_TRIANGLE, Vec3::NEG_Y, 0.15),
+        plane(LIGHT_QUAD, Vec3::NEG_Y, 0.3),
+        sphere(Vec3::new(0.2, 0.8, -0.1), 0.3, 1.0),
+        sphere(Vec3::ZERO, 4.0, -1.0),
+        sphere(Vec3::new(0.5, 0.5, 0.5), 1e-3, 1.0),
+        point,
+    ];
+    let table = alias_table(&[0.3, 0.2, 0.25, 0.05, 0.01, 0.19]);
+    for (light, (threshold, alias)) in lights.iter_mut().zip(table) {
+        light.alias_threshold = threshold as f32;
+        light.alias = alias;
+    }
+    lights
+}
+
+#[test]
+fn light_sources() {
+    let lights = lights();
+    let wide: Vec<bindings::Light> = lights.iter().map(bindings::Light::from).collect();
+    let mut random = Random(12);
+    let mut inputs = Vec::new();
+    for u in units_in_question() {
+        for index in 0..lights.len() {
+            let p = random.in_cube() * 2.0;
+            inputs.extend([vec4(&[p.x, p.y, p.z, random.unit()]), vec4(&[u, index as f64])]);
+        }
+    }
+    let count = inputs.len() / 2;
+    let outputs: Vec<[f32; 4]> = run("light", &inputs, &[bytemuck::cast_slice(&lights)], count, 3 * count);
+    let names =
+        ["light direction", "light distance", "sphere light distance", "light weight", "light pdf", "alias rescaled"];
+    let [mut direction, mut distance, mut sphere_distance, mut weight, mut pdf, mut rescaled] = names.map(comparison);
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
+        let point = widen(&input[0][..3]);
+        let u = DVec2::new(f64::from(input[1][0]), f64::from(input[0][3]));
+        let index = input[1][1] as usize;
+        let light = &wide[index];
+        let case = format!("light {index}, {input:?}");
+        let (found, asked) = match light.kind {
+            LIGHT_POINT => (light::sample_point_light(light, point), 0.0),
+            LIGHT_SPHERE => {
+                let asked = light::sphere_light_pdf(light.edge_1.x, point.distance(light.origin));
+                (light::sample_sphere_light(light, point, u), asked)
+            }
+            _ => {
+                let found = light::sample_plane_light(light, point, u);
+                let cosine = -found.direction.dot(light.normal);
+                (found, light::area_pdf(light.area, found.distance, cosine))
+            }
+        };
+        // A plane light seen edge-on has no digits left in its cosine; a sphere's surface is where inside becomes
+        // outside.
+        let edge_on = light.kind <= LIGHT_QUAD && found.direction.dot(light.normal).abs() < 0.02;
+        let border = light.kind == LIGHT_SPHERE && (point.distance(light.origin) / light.edge_1.x - 1.0).abs() < 1e-3;
+        if !border && !edge_on {
+            direction.vector(&case, &output[0][..3], found.direction);
+            if light.kind == LIGHT_SPHERE {
+                // The rim of a sphere that covers little of the view is lost to rounding of the direction.
+                if light.edge_1.x > 0.1 {
+                    sphere_distance.scalar(&case, output[0][3], found.distance);
+                }
+            } else {
+                distance.scalar(&case, output[0][3], found.distance);
+            }
+            weight.vector(&case, &output[1][..3], found.weight);
+            pdf.scalar(&case, output[1][3], found.pdf);
+            if asked.is_finite() {
+                pdf.scalar(&case, output[2][0], asked);
+            }
+        }
+        let mut rest = u.x;
+        let line = light::alias_line(lights.len() as u32, &mut rest);
+        let threshold = wide[line as usize].alias_threshold;
+        let border = (rest - threshold).abs() < 1e-6;
+        assert_eq!(output[2][1] as u32, line, "{case}");
+        if !border {
+            let keeps = light::alias_keeps(threshold, &mut rest);
+            assert_eq!(output[2][3] == 1.0, keeps, "{case}");
+            rescaled.scalar(&case, output[2][2], rest);
+        }
+        assert!((0.0..1.0).contains(&output[2][2]), "{case}: the rescaled number is {}", output[2][2]);
+    }
+    [direction, distance, sphere_distance, weight, pdf, rescaled].into_iter().for_each(Comparison::finish);
+}
+
+#[test]
+fn cameras() {
+    let mut random = Random(13);
+    let mut inputs = Vec::new();
+    for _ in 0..1000 {
+        let [corner, right, down] = [0; 3].map(|_| narrow(random.in_cube()).map(f64::from));
+        inputs.extend([corner, right, down].map(|vector| vec4(&vector)));
+        inputs.push(vec4(&[random.unit(), random.unit()]));
+    }
+    let count = inputs.len() / 4;
+    let outputs: Vec<[f32; 4]> = run("camera", &inputs, &[], count, count);
+    let mut direction = comparison("camera_direction");
+    for (input, output) in inputs.chunks(4).zip(&outputs) {
+        let [corner, right, down] = [0, 1, 2].map(|k| widen(&input[k][..3]));
+        let film = DVec2::new(f64::from(input[3][0]), f64::from(input[3][1]));
+        let expected = camera::camera_direction(corner, right, down, film);
+        // Relative to the vectors that are added, which may cancel.
+        if expected.length() > 0.5 {
+            direction.vector(format!("{input:?}"), &output[..3], expected);
+        }
+    }
+    direction.finish();
+}
+
+#[test]
+fn tiles_cover_the_crop_window_once() {
+    let (width, height) = (29u32, 17u32);
+    let tiles = width.div_ceil(layout::TILE) * height.div_ceil(layout::TILE);
+    let pixels = layout::TILE * layout::TILE;
+    let inputs: Vec<[u32; 4]> = (0..tiles * pixels).map(|slot| [slot / pixels, slot % pixels, width, 0]).collect();
+    let outputs: Vec<[u32; 4]> = run("film", &inputs, &[], inputs.len(), inputs.len());
+    let mut seen = std::collections::HashSet::new();
+    for (input, output) in inputs.iter().zip(&outputs) {
+        assert_eq!(film::tile_pixel(input[0], input[1], input[2]), output[..2], "{input:?}");
+        assert!(seen.insert(*output), "{output:?} is covered twice");
+    }
+    let inside = seen.iter().filter(|[x, y, ..]| *x < width && *y < height).count();
+    assert_eq!(inside, (width * height) as usize);
+}
