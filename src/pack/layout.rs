@@ -1,6 +1,6 @@
 //! The one declaration of every struct that Rust and GLSL share.
 //!
-//! [`gpu_struct!`] declares a `#[repr(C)]` struct, its GLSL text with the same doc comments, the offsets of its members, and
+//! [`gpu_struct!`](crate::gpu_struct) declares a `#[repr(C)]` struct, its GLSL text with the same doc comments, the offsets of its members, and
 //! asserts at compile time that these are the offsets of std430. A test compares all of it with what naga reads back
 //! from each compiled kernel.
 //!
