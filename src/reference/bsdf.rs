@@ -42,11 +42,12 @@ const NO_SAMPLE: BsdfSample = BsdfSample { direction: DVec3::Z, weight: DVec3::Z
 pub fn fresnel_dielectric(cos_i: f64, eta: f64) -> (f64, f64) {
     let n = if cos_i >= 0.0 { eta } else { 1.0 / eta };
     let c = cos_i.abs();
-    let sin_t_squared = (1.0 - c) * (1.0 + c) / (n * n);
-    if sin_t_squared >= 1.0 {
+    let beyond = (eta - 1.0) * (eta + 1.0);
+    let t_squared = if cos_i >= 0.0 { (c * c + beyond) / (eta * eta) } else { c * c * eta * eta - beyond };
+    if t_squared <= 0.0 {
         return (1.0, 0.0);
     }
-    let t = (1.0 - sin_t_squared).sqrt();
+    let t = t_squared.sqrt();
     let s = (c - n * t) / (c + n * t);
     let p = (n * c - t) / (n * c + t);
     (0.5 * (s * s + p * p), if cos_i >= 0.0 { -t } else { t })
@@ -72,14 +73,14 @@ pub fn facet_density(m: DVec3, alpha: f64, ggx: bool) -> f64 {
     if m.z <= 0.0 {
         return 0.0;
     }
-    let c2 = m.z * m.z;
-    let tan2 = (m.x * m.x + m.y * m.y) / c2;
+    let (c2, s2) = (m.z * m.z, m.x * m.x + m.y * m.y);
     let a2 = alpha * alpha;
     if ggx {
-        let d = 1.0 + tan2 / a2;
-        return 1.0 / (PI * a2 * c2 * c2 * d * d);
+        let d = a2 * c2 + s2;
+        return a2 / (PI * d * d);
     }
-    exp_minus(tan2 / a2) / (PI * a2 * c2 * c2)
+    let shape = exp_minus(s2 / (a2 * c2));
+    if shape > 0.0 { shape / (PI * a2 * c2 * c2) } else { 0.0 }
 }
 
 /// Smith's masking of direction v for facets with normal m.
@@ -261,6 +262,10 @@ pub fn sample_bsdf(surface: &Surface, wi: DVec3, u: DVec2, lobe: f64) -> BsdfSam
         let m = sample_facet(u, surface.alpha, is_ggx(surface));
         found.direction = 2.0 * wi.dot(m) * m - wi;
         if kind == BSDF_DIELECTRIC {
+            // A facet that is seen from behind is none.
+            if wi.dot(m) * wi.z <= 0.0 {
+                return NO_SAMPLE;
+            }
             let (f, cos_t) = fresnel_dielectric(wi.dot(m), surface.eta);
             if lobe >= f {
                 found.direction = refract_at(wi, m, cos_t, surface.eta);
