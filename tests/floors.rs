@@ -82,6 +82,7 @@ fn unsafe_outside_gpu(sources: &[Source]) -> Vec<String> {
 /// What a file of `shaders/lib` may include beside the generated files and constants.
 const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("sampler", &["rng"]),
+    ("bsdf", &["math", "warp"]),
     ("light", &["math", "warp"]),
     ("medium", &["math"]),
     ("path", &["math", "sampler", "warp", "ray", "camera", "medium", "phase", "bsdf", "light"]),

@@ -11,7 +11,7 @@ use glam::{DVec2, DVec3, Vec3};
 use tyndall::pack::layout::{self, INFINITE_DISTANCE, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_TRIANGLE, Light};
 use tyndall::pack::lights::alias_table;
 use tyndall::pack::sobol;
-use tyndall::reference::{bindings, bsdf, camera, film, light, math, medium, phase, rng, sampler, warp};
+use tyndall::reference::{bindings, camera, film, light, math, medium, phase, rng, sampler, warp};
 
 /// The numbers k/2²⁴ that matter most: both ends, powers of two, and some in between.
 fn units_in_question() -> Vec<f64> {
@@ -195,24 +195,6 @@ fn phase_functions() {
         functions[5].scalar(&case, output[1][3], phase::eval_henyey_greenstein(g, before, after));
     }
     functions.into_iter().for_each(Comparison::finish);
-}
-
-#[test]
-fn surfaces() {
-    let mut random = Random(11);
-    let mut inputs: Vec<[f32; 4]> = vec![vec4(&[0.0, 1.0, -1.0, 1e-30])];
-    inputs.extend((0..500).map(|_| [0.0; 4].map(|_: f32| random.between(-1.0, 1.0) as f32)));
-    let outputs: Vec<[f32; 4]> = run("bsdf", &inputs, &[], inputs.len(), 2 * inputs.len());
-    let [mut eval, mut pdf] = ["eval_diffuse", "diffuse_pdf"].map(comparison);
-    for (input, output) in inputs.iter().zip(outputs.chunks(2)) {
-        for k in 0..4 {
-            let cosine = f64::from(input[k]);
-            eval.scalar(cosine, output[0][k], bsdf::eval_diffuse(cosine));
-            pdf.scalar(cosine, output[1][k], bsdf::diffuse_pdf(cosine));
-        }
-    }
-    eval.finish();
-    pdf.finish();
 }
 
 /// One light of each kind, near the origin.

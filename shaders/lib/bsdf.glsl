@@ -23,12 +23,14 @@ struct BsdfSample {
 float fresnel_dielectric(float cos_i, float eta, out float cos_t) {
     float n = cos_i >= 0.0 ? eta : 1.0 / eta;
     float c = abs(cos_i);
-    float sin_t_squared = (1.0 - c) * (1.0 + c) / (n * n);
-    if (sin_t_squared >= 1.0) {
+    // 1 - (1 - c^2) / n^2, in terms of eta, which has no rounding error, so that glass of index 1 is invisible.
+    float beyond = (eta - 1.0) * (eta + 1.0);
+    float t_squared = cos_i >= 0.0 ? (c * c + beyond) / (eta * eta) : c * c * eta * eta - beyond;
+    if (t_squared <= 0.0) {
         cos_t = 0.0;
         return 1.0;
     }
-    float t = sqrt(1.0 - sin_t_squared);
+    float t = sqrt(t_squared);
     float s = (c - n * t) / (c + n * t);
     float p = (n * c - t) / (n * c + t);
     cos_t = cos_i >= 0.0 ? -t : t;
@@ -53,14 +55,15 @@ float facet_density(vec3 m, float alpha, bool ggx) {
     if (m.z <= 0.0) {
         return 0.0;
     }
-    float c2 = m.z * m.z;
-    float tan2 = (m.x * m.x + m.y * m.y) / c2;
+    float c2 = m.z * m.z, s2 = m.x * m.x + m.y * m.y;
     float a2 = alpha * alpha;
     if (ggx) {
-        float d = 1.0 + tan2 / a2;
-        return 1.0 / (PI * a2 * c2 * c2 * d * d);
+        float d = a2 * c2 + s2;
+        return a2 / (PI * d * d);
     }
-    return exp_minus(tan2 / a2) / (PI * a2 * c2 * c2);
+    // Where c2 is too small for single precision, the exponential is 0.
+    float shape = exp_minus(s2 / (a2 * c2));
+    return shape > 0.0 ? shape / (PI * a2 * c2 * c2) : 0.0;
 }
 
 // Smith's masking of direction v for facets with normal m.
@@ -239,6 +242,10 @@ BsdfSample sample_bsdf(Surface surface, vec3 wi, vec2 u, float lobe) {
         vec3 m = sample_facet(u, surface.alpha, is_ggx(surface));
         found.direction = 2.0 * dot(wi, m) * m - wi;
         if (HAS_DIELECTRIC && kind == BSDF_DIELECTRIC) {
+            // A facet that is seen from behind is none; eval_bsdf knows nothing of what it would send elsewhere.
+            if (dot(wi, m) * wi.z <= 0.0) {
+                return none;
+            }
             float cos_t;
             float f = fresnel_dielectric(dot(wi, m), surface.eta, cos_t);
             if (lobe >= f) {

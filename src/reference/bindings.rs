@@ -37,13 +37,20 @@ pub struct Primitive {
 }
 
 /// See [`layout::Surface`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[allow(missing_docs, reason = "the members are documented in `layout`")]
 pub struct Surface {
     pub reflectance: DVec3,
     pub flags: u32,
     pub sigma_t_step: DVec3,
     pub media: u32,
+    pub specular: DVec3,
+    pub eta: f64,
+    pub transmittance: DVec3,
+    pub alpha: f64,
+    pub extinction: DVec3,
+    pub internal_reflectance: f64,
+    pub specular_weight: f64,
 }
 
 /// See [`layout::Medium`].
@@ -142,6 +149,13 @@ impl From<&layout::Surface> for Surface {
             flags: from.flags,
             sigma_t_step: from.sigma_t_step.as_dvec3(),
             media: from.media,
+            specular: from.specular.as_dvec3(),
+            eta: f64::from(from.eta),
+            transmittance: from.transmittance.as_dvec3(),
+            alpha: f64::from(from.alpha),
+            extinction: from.extinction.as_dvec3(),
+            internal_reflectance: f64::from(from.internal_reflectance),
+            specular_weight: f64::from(from.specular_weight),
         }
     }
 }

@@ -34,6 +34,12 @@ pub fn from_frame(axis: DVec3, local: DVec3) -> DVec3 {
     (tangent * local.x + bitangent * local.y + axis * local.z).normalize()
 }
 
+/// The components of a direction in that frame.
+pub fn to_frame(axis: DVec3, direction: DVec3) -> DVec3 {
+    let (tangent, bitangent) = orthonormal_frame(axis);
+    DVec3::new(tangent.dot(direction), bitangent.dot(direction), axis.dot(direction))
+}
+
 /// The largest component.
 pub fn max_component(v: DVec3) -> f64 {
     v.max_element()

@@ -1,24 +1,25 @@
 //! Mirror of `shaders/lib/path.glsl`: the estimator, a path as a coroutine that asks for one ray at a time. A path's
 //! life is described there. What the kernel leaves out where a scene does not need it is always here.
 
-use super::bindings::{Light, Medium, Primitive, Tables};
-use super::bsdf::eval_diffuse;
+use super::bindings::{Light, Medium, Primitive, Surface, Tables};
+use super::bsdf::{BsdfSample, BsdfValue, bsdf_has_density, eval_bsdf, sample_bsdf};
 use super::camera::camera_direction;
 use super::light::{
     LightSample, alias_keeps, alias_line, area_pdf, sample_plane_light, sample_point_light, sample_sphere_light,
     sphere_light_pdf,
 };
-use super::math::{exp_minus_rgb, from_frame, max_component, minus_log_1m};
+use super::math::{exp_minus_rgb, from_frame, max_component, minus_log_1m, to_frame};
 use super::medium::{
     channel_weights, cross_boundary, free_flight, sample_channel, scatter_weight, survival_probability, survival_weight,
 };
 use super::phase::{eval_henyey_greenstein, sample_henyey_greenstein};
 use super::ray::{Ray, TriangleHit, intersect_sphere, intersect_triangle, offset_distance};
 use super::sampler::{point_index, set_key, shifted_point};
-use super::warp::{from_polar, square_to_cosine_hemisphere};
+use super::warp::from_polar;
 use crate::pack::layout;
 use crate::pack::layout::{
-    LIGHT_CONSTANT, LIGHT_POINT, LIGHT_SPHERE, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_TWO_SIDED,
+    LIGHT_CONSTANT, LIGHT_POINT, LIGHT_SPHERE, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_ORIENTED,
+    SURFACE_TWO_SIDED,
 };
 use crate::pack::sobol::SOBOL_SETS;
 use glam::{DVec2, DVec3, DVec4, Vec4Swizzles};
@@ -79,6 +80,20 @@ pub struct Path {
     pub pdf_ratio: f64,
     /// The light that the shadow ray goes to.
     pub light: u32,
+    /// The throughput that scattering towards the light would have.
+    pub light_channels: DVec3,
+    /// The medium in which the shadow ray begins.
+    pub light_medium: u32,
+    /// Of the vertex.
+    pub point: DVec3,
+    /// Of rays that leave a surface, along its normal; 0 in a medium.
+    pub offset: f64,
+    /// Only valid where `offset` is not 0.
+    pub normal: DVec3,
+    /// The medium of the next segment.
+    pub next_medium: u32,
+    /// The product of squared indices that refraction divided radiance by.
+    pub eta_scale: f64,
 }
 
 /// What the traversal found.
@@ -98,14 +113,14 @@ pub struct Hit {
     pub blocked: bool,
 }
 
-fn medium_of<'a>(tables: &'a Tables, path: &Path) -> &'a Medium {
+fn medium_at(tables: &Tables, medium: u32) -> &Medium {
     // An index that boundaries without a consistent nesting made up is vacuum.
-    tables.media.get(path.medium as usize).unwrap_or(&tables.media[0])
+    tables.media.get(medium as usize).unwrap_or(&tables.media[0])
 }
 
 /// Distance to the end of the flight with the extinction that holds from `t_min` on.
 fn flight_end(tables: &Tables, path: &Path) -> f64 {
-    let sigma = medium_of(tables, path).sigma_t[path.channel as usize];
+    let sigma = medium_at(tables, path.medium).sigma_t[path.channel as usize];
     (path.t_min + free_flight(path.tau_left, sigma)).min(path.far_end)
 }
 
@@ -144,6 +159,7 @@ pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     path.throughput = DVec3::ONE;
     path.radiance = DVec3::ZERO;
     path.alive = true;
+    path.eta_scale = 1.0;
     path.medium = params.camera_medium;
     begin_segment(tables, &mut path, u.zw());
     path
@@ -203,32 +219,61 @@ fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: f64,
 #[derive(Clone, Copy, Debug)]
 struct Vertex {
     point: DVec3,
-    /// Normal on the side of the incident ray; in a medium, the direction of propagation.
+    /// z of the surface's local frame; in a medium, the direction of propagation.
     axis: DVec3,
     in_medium: bool,
+    /// Of the medium.
     g: f64,
+    /// Of the medium, with the weight of the flight.
+    albedo: DVec3,
+    surface: Surface,
+    /// On a surface: towards where the path comes from, in the local frame.
+    incident: DVec3,
 }
 
-/// Scattering function times cosine over the albedo or reflectance: also the density with which directions are sampled.
-fn eval_scattering(vertex: &Vertex, direction: DVec3) -> f64 {
+/// Scattering function times cosine, and the density with which directions are sampled.
+fn eval_scattering(vertex: &Vertex, direction: DVec3) -> BsdfValue {
     if vertex.in_medium {
-        return eval_henyey_greenstein(vertex.g, vertex.axis, direction);
+        let phase = eval_henyey_greenstein(vertex.g, vertex.axis, direction);
+        return BsdfValue { value: vertex.albedo * phase, pdf: phase };
     }
-    eval_diffuse(vertex.axis.dot(direction))
+    eval_bsdf(&vertex.surface, vertex.incident, to_frame(vertex.axis, direction))
 }
 
-fn sample_scattering(vertex: &Vertex, u: DVec2) -> DVec3 {
+fn sample_scattering(vertex: &Vertex, u: DVec2, lobe: f64) -> BsdfSample {
     if vertex.in_medium {
         let angle = sample_henyey_greenstein(vertex.g, u.x);
         let local = from_polar(angle.cos_theta, angle.sin_theta, u.y);
         // For g = 0 no axis matters; the kernel leaves the frame out where it knows no other g.
-        return if vertex.g == 0.0 { local } else { from_frame(vertex.axis, local) };
+        let direction = if vertex.g == 0.0 { local } else { from_frame(vertex.axis, local) };
+        let pdf = eval_scattering(vertex, direction).pdf;
+        return BsdfSample { direction, weight: vertex.albedo, pdf, eta: 1.0 };
     }
-    from_frame(vertex.axis, square_to_cosine_hemisphere(u))
+    let found = sample_bsdf(&vertex.surface, vertex.incident, u, lobe);
+    BsdfSample { direction: from_frame(vertex.axis, found.direction), ..found }
+}
+
+/// Where a ray in some direction begins so that it does not meet the surface it leaves.
+fn offset_origin(path: &Path, direction: DVec3) -> DVec3 {
+    path.point + path.normal * if path.normal.dot(direction) >= 0.0 { path.offset } else { -path.offset }
+}
+
+/// The medium on the side of a surface to which a direction goes, for a path that came in `medium`.
+fn medium_towards(vertex: &Vertex, medium: u32, direction: DVec3) -> u32 {
+    if vertex.in_medium || vertex.surface.flags & SURFACE_ORIENTED == 0 {
+        return medium;
+    }
+    let outwards = vertex.axis.dot(direction) > 0.0;
+    if outwards == (vertex.incident.z > 0.0) || vertex.surface.media == 0 {
+        return medium;
+    }
+    let (inside, outside) = (vertex.surface.media & 0xffff, vertex.surface.media >> 16);
+    let (from, to) = if outwards { (inside, outside) } else { (outside, inside) };
+    cross_boundary(medium, from, to)
 }
 
 /// Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.
-fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2) -> bool {
+fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2, lobe: f64) -> bool {
     if !tables.features.light_sampling {
         return false;
     }
@@ -240,8 +285,7 @@ fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2)
         LIGHT_CONSTANT => {
             // No direction is better than another, so the scattering function samples them; what light sampling adds is
             // the transmittance, exact instead of 0 or 1.
-            let direction = sample_scattering(vertex, u);
-            let pdf = eval_scattering(vertex, direction);
+            let BsdfSample { direction, pdf, .. } = sample_scattering(vertex, u, lobe);
             let weight = if pdf > 0.0 { light.radiance / pdf } else { DVec3::ZERO };
             LightSample { direction, distance: INFINITE_DISTANCE, weight, pdf }
         }
@@ -253,29 +297,37 @@ fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2)
     path.direction = found.direction;
     path.t_max = found.distance;
     path.light = index;
-    path.light_weight = path.throughput * found.weight * (scattering / light.probability);
-    path.pdf_ratio = if found.pdf > 0.0 { scattering / (found.pdf * light.probability) } else { 0.0 };
+    path.light_channels = path.throughput * scattering.value;
+    path.light_weight = path.light_channels * found.weight / light.probability;
+    path.pdf_ratio = if found.pdf > 0.0 { scattering.pdf / (found.pdf * light.probability) } else { 0.0 };
+    path.light_medium = medium_towards(vertex, path.medium, found.direction);
+    path.origin = offset_origin(path, found.direction);
     max_component(path.light_weight) > 0.0
 }
 
 /// Scatters at a vertex: the shadow ray, the next direction, roulette.
-fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex, albedo: DVec3) {
+fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     path.depth += 1;
-    path.throughput *= albedo;
-    path.alive = max_component(path.throughput) > 0.0 && path.depth < tables.features.max_depth;
     path.shadow = false;
+    path.alive = path.depth < tables.features.max_depth;
     if !path.alive {
         return;
     }
     let u = sample_set(tables, path, 2 * path.segment + 1);
-    path.next_direction = sample_scattering(vertex, u.zw());
-    path.pdf = eval_scattering(vertex, path.next_direction);
-    path.alive = path.pdf > 0.0;
-    path.origin = vertex.point;
+    let lobe = sample_set(tables, path, 2 * path.segment + 2).y;
+    let next = sample_scattering(vertex, u.zw(), lobe);
+    path.point = vertex.point;
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
-    path.shadow = sample_light(tables, path, vertex, u.xy());
+    path.shadow =
+        (vertex.in_medium || bsdf_has_density(&vertex.surface)) && sample_light(tables, path, vertex, u.xy(), u.z);
+    path.next_direction = next.direction;
+    path.next_medium = medium_towards(vertex, path.medium, next.direction);
+    path.throughput *= next.weight;
+    path.pdf = next.pdf;
+    path.eta_scale *= next.eta * next.eta;
+    path.alive = max_component(path.throughput) > 0.0;
 }
 
 /// Begins the segment after a vertex, unless roulette ends the path.
@@ -284,11 +336,13 @@ fn next_segment(tables: &Tables, path: &mut Path) {
     let u = sample_set(tables, path, 2 * path.segment);
     if path.depth >= tables.features.rr_depth {
         let most = if path.depth < RELENTLESS_DEPTH { 1.0 } else { 0.95 };
-        let keep = (3.0 * max_component(path.throughput)).min(most);
+        let keep = (3.0 * max_component(path.throughput) * path.eta_scale).min(most);
         path.alive = path.alive && u.x < keep;
         path.throughput /= keep;
     }
     path.direction = path.next_direction;
+    path.origin = offset_origin(path, path.direction);
+    path.medium = path.next_medium;
     path.t_min = 0.0;
     begin_segment(tables, path, u.zw());
 }
@@ -311,7 +365,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
     let t = if surface_hit { hit.t } else { path.t_max };
 
     // The optical depth of the way through the medium since `t_min`.
-    let medium = *medium_of(tables, path);
+    let medium = *medium_at(tables, path.medium);
     let way = t - path.t_min;
     path.tau_left -= way * medium.sigma_t[path.channel as usize];
     path.tau_rgb += medium.sigma_t * way;
@@ -324,7 +378,12 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
     if !surface_hit {
         let weight = scatter_weight(channel_weights(path.throughput), path.tau_rgb, medium.sigma_t, medium.albedo);
         let point = path.origin + path.direction * t;
-        scatter(tables, path, &Vertex { point, axis: path.direction, in_medium: true, g: medium.g }, weight);
+        path.offset = 0.0;
+        path.normal = path.direction;
+        let (surface, incident) = (Surface::default(), DVec3::ZERO);
+        let vertex =
+            Vertex { point, axis: path.direction, in_medium: true, g: medium.g, albedo: weight, surface, incident };
+        scatter(tables, path, &vertex);
     } else {
         let primitive = tables.primitive(hit.primitive);
         let surface = tables.surface_of(primitive);
@@ -342,10 +401,20 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         add_emission(tables, path, primitive, t, normal);
         path.throughput = survived_throughput(path);
         let back = path.direction.dot(normal) > 0.0;
-        let black = back && surface.flags & SURFACE_TWO_SIDED == 0;
-        let axis = if back { -normal } else { normal };
-        let vertex = Vertex { point: point + axis * offset_distance(largest), axis, in_medium: false, g: 0.0 };
-        scatter(tables, path, &vertex, if black { DVec3::ZERO } else { surface.reflectance });
+        if back && surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED) == 0 {
+            path.alive = false;
+            path.shadow = false;
+            return;
+        }
+        let axis = if back && surface.flags & SURFACE_ORIENTED == 0 { -normal } else { normal };
+        path.offset = offset_distance(largest);
+        path.normal = axis;
+        let (surface, incident) = (*surface, to_frame(axis, -path.direction));
+        scatter(
+            tables,
+            path,
+            &Vertex { point, axis, in_medium: false, g: 0.0, albedo: DVec3::ZERO, surface, incident },
+        );
     }
     if !path.shadow && path.alive {
         next_segment(tables, path);
@@ -356,7 +425,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
 pub fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
     if !hit.blocked {
         let transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
-        let survives = channel_weights(path.throughput).dot(transmittance);
+        let survives = channel_weights(path.light_channels).dot(transmittance);
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
     }
     path.shadow = false;
@@ -390,7 +459,8 @@ pub fn begin_hit(tables: &Tables, path: &Path) -> Hit {
         blocked: false,
     };
     if path.shadow {
-        hit.tau_rgb = medium_of(tables, path).sigma_t * shadow_length(path) + depth_at_infinity(tables, path);
+        hit.tau_rgb =
+            medium_at(tables, path.light_medium).sigma_t * shadow_length(path) + depth_at_infinity(tables, path);
     }
     hit
 }

@@ -64,7 +64,12 @@ pub fn compare(one: &Image, two: &Image) -> Result<f64, String> {
 /// Independent estimates of what all pixels of a scene have in common: the pixels, dealt out to 64 batches. Each pixel has its own
 /// random shift of the sampler's points, while two samples of a pixel may share one and are no independent estimates.
 pub fn batches(scene: &tyndall::scene::Scene, seed: u32, spp: u32) -> Vec<DVec3> {
-    let image = on_device(&super::scenes::pack(scene, seed), spp);
+    batches_of(&super::scenes::pack(scene, seed), spp)
+}
+
+/// The same, of a scene's tables.
+pub fn batches_of(packed: &Packed, spp: u32) -> Vec<DVec3> {
+    let image = on_device(packed, spp);
     assert!(image.len().is_multiple_of(BATCHES) && image.len() > BATCHES, "each batch has as many pixels");
     let pixels = (image.len() / BATCHES) as f64;
     (0..BATCHES).map(|first| image.iter().skip(first).step_by(BATCHES).sum::<DVec3>() / pixels).collect()

@@ -7,6 +7,7 @@ pub mod images;
 pub mod random;
 pub mod scenes;
 pub mod statistics;
+pub mod surfaces;
 pub mod tolerances;
 pub mod truth;
 pub mod units;

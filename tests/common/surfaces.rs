@@ -1,0 +1,119 @@
+//! Surfaces with every kind of BSDF, as the tables have them, and what their unit kernel finds.
+
+use super::units::{run, vec4, widen};
+use glam::{DVec3, Vec3};
+use tyndall::pack::layout::*;
+
+/// Glass of relative index 1.5 that takes nothing away.
+pub fn glass(alpha: f32, ggx: bool) -> Surface {
+    Surface {
+        flags: BSDF_DIELECTRIC << SURFACE_KIND_SHIFT | SURFACE_ORIENTED | if ggx { SURFACE_GGX } else { 0 },
+        specular: Vec3::ONE,
+        transmittance: Vec3::ONE,
+        eta: 1.5,
+        alpha,
+        ..Surface::default()
+    }
+}
+
+/// Something like copper.
+pub fn metal(alpha: f32, ggx: bool) -> Surface {
+    Surface {
+        flags: BSDF_CONDUCTOR << SURFACE_KIND_SHIFT | SURFACE_TWO_SIDED | if ggx { SURFACE_GGX } else { 0 },
+        specular: Vec3::ONE,
+        transmittance: Vec3::new(0.2, 0.92, 1.1),
+        extinction: Vec3::new(3.9, 2.45, 2.14),
+        eta: 1.0,
+        alpha,
+        ..Surface::default()
+    }
+}
+
+/// A coloured body under a varnish of index 1.5, whose diffuse internal reflectance is 0.5963.
+pub fn plastic(alpha: f32, ggx: bool) -> Surface {
+    Surface {
+        flags: BSDF_PLASTIC << SURFACE_KIND_SHIFT | SURFACE_TWO_SIDED | if ggx { SURFACE_GGX } else { 0 },
+        reflectance: Vec3::new(0.8, 0.5, 0.2),
+        specular: Vec3::ONE,
+        eta: 1.5,
+        alpha,
+        internal_reflectance: 0.5963,
+        specular_weight: 0.65,
+        ..Surface::default()
+    }
+}
+
+/// What is asked of the kernel.
+#[derive(Clone, Copy, Debug)]
+pub struct Query {
+    /// Index of the surface.
+    pub surface: usize,
+    pub wi: DVec3,
+    pub wo: DVec3,
+    pub u: [f64; 2],
+    pub lobe: f64,
+}
+
+/// What the kernel answers.
+#[derive(Clone, Copy, Debug)]
+pub struct Answer {
+    pub direction: [f32; 3],
+    pub pdf: f32,
+    pub weight: [f32; 3],
+    pub eta: f32,
+    pub value: [f32; 3],
+    pub value_pdf: f32,
+    pub fresnel: f32,
+    pub cos_t: f32,
+    /// Of wi and wo.
+    pub masking: [f32; 2],
+    pub facet: [f32; 3],
+    pub density: f32,
+    pub conductor: [f32; 3],
+}
+
+impl Answer {
+    /// The sampled direction.
+    pub fn wo(&self) -> DVec3 {
+        widen(&self.direction)
+    }
+
+    /// Whether nothing was sampled.
+    pub fn failed(&self) -> bool {
+        self.weight == [0.0; 3]
+    }
+}
+
+/// Rounded to what the kernel gets.
+pub fn single(vector: DVec3) -> DVec3 {
+    vector.as_vec3().as_dvec3()
+}
+
+/// Runs the unit kernel.
+pub fn ask(surfaces: &[Surface], queries: &[Query]) -> Vec<Answer> {
+    let inputs: Vec<[f32; 4]> = queries
+        .iter()
+        .flat_map(|query| {
+            let Query { surface, wi, wo, u, lobe } = query;
+            [vec4(&[wi.x, wi.y, wi.z, *surface as f64]), vec4(&[wo.x, wo.y, wo.z, *lobe]), vec4(u)]
+        })
+        .collect();
+    let table = bytemuck::cast_slice(surfaces);
+    let outputs: Vec<[f32; 4]> = run("bsdf", &inputs, &[table], queries.len(), 6 * queries.len());
+    let three = |vector: [f32; 4]| [vector[0], vector[1], vector[2]];
+    let answer = |output: &[[f32; 4]]| Answer {
+        direction: three(output[0]),
+        pdf: output[0][3],
+        weight: three(output[1]),
+        eta: output[1][3],
+        value: three(output[2]),
+        value_pdf: output[2][3],
+        fresnel: output[3][0],
+        cos_t: output[3][1],
+        masking: [output[3][2], output[3][3]],
+        facet: three(output[4]),
+        density: output[4][3],
+        conductor: three(output[5]),
+    };
+    outputs.chunks(6).map(answer).collect()
+}
