@@ -1,0 +1,260 @@
+//! BSDFs of the kernels against the reference, over ordinary and extreme inputs.
+
+mod common;
+
+use common::comparison::Comparison;
+use common::random::Random;
+use common::scenes::v;
+use common::surfaces::{Query, ask, glass, metal, plastic, single};
+use common::tolerances::comparison;
+use common::units::widen;
+use glam::{DVec2, DVec3};
+use tyndall::pack::layout::{SURFACE_GGX, SURFACE_NONLINEAR, SURFACE_THIN, Surface};
+use tyndall::reference::bindings;
+use tyndall::reference::bsdf::{
+    BsdfValue, eval_bsdf, facet_density, facet_masking, fresnel_conductor, fresnel_dielectric, sample_bsdf,
+    sample_facet,
+};
+
+/// The largest of the program's random numbers.
+const LAST: f64 = 1.0 - 1.0 / 16_777_216.0;
+
+fn surfaces() -> Vec<Surface> {
+    let mut all = vec![Surface { reflectance: glam::Vec3::new(0.2, 0.5, 1.0), ..Surface::default() }];
+    for ggx in [false, true] {
+        for alpha in [0.0, 1e-3, 0.03, 0.1, 0.5, 1.0] {
+            all.extend([glass(alpha, ggx), metal(alpha, ggx), plastic(alpha, ggx)]);
+            all.push(Surface { eta: 0.7, ..glass(alpha, ggx) });
+            all.push(Surface { eta: 1.02, ..glass(alpha, ggx) });
+        }
+    }
+    all.push(Surface { flags: glass(0.0, false).flags | SURFACE_THIN, ..glass(0.0, false) });
+    all.push(Surface { flags: plastic(0.2, true).flags | SURFACE_NONLINEAR, ..plastic(0.2, true) });
+    all
+}
+
+/// Directions that matter: along the normal, grazing, at and beside the border of total reflection, on both sides.
+fn directions(random: &mut Random, eta: f64) -> Vec<DVec3> {
+    let critical = (1.0 - eta.min(1.0 / eta).powi(2)).sqrt();
+    let mut cosines = vec![1.0, 1.0 - 1e-7, 1e-2, 1e-4, 1e-6];
+    cosines.extend([-1e-3, -1e-5, -1e-6, 1e-6, 1e-5, 1e-3].map(|step| (critical + step).clamp(1e-6, 1.0)));
+    cosines.extend((0..12).map(|_| random.unit().max(1e-3)));
+    cosines
+        .into_iter()
+        .flat_map(|z| [z, -z])
+        .map(|z: f64| {
+            let (sine, phi) = ((1.0 - z * z).max(0.0).sqrt(), 6.0 * random.unit());
+            single(v(sine * phi.cos(), sine * phi.sin(), z))
+        })
+        .collect()
+}
+
+/// Errors that rounding of the inputs explains are none: `got` moved towards `want` by as much as `want` changes when each
+/// component of the inputs moves by two units of single precision's last place.
+fn explained(got: f32, want: f64, moved: impl Iterator<Item = f64>) -> f32 {
+    let slack: f64 = moved.map(|moved| (moved - want).abs()).sum();
+    let error = f64::from(got) - want;
+    if error.abs() <= slack { want as f32 } else { (want + error - slack.copysign(error)) as f32 }
+}
+
+fn nudges() -> impl Iterator<Item = DVec3> {
+    [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [axis * 2.4e-7, axis * -2.4e-7])
+}
+
+/// `vector` moved in all ways that keep it on its side.
+fn nudged(vector: DVec3) -> impl Iterator<Item = DVec3> {
+    nudges().map(move |step| {
+        let step = v(step.x, step.y, step.z * vector.z.abs().min(1.0));
+        vector + step
+    })
+}
+
+/// What `value` may lose where little light is refracted: single precision has an error of 1.2e-7 in Fresnel's reflectance
+/// close to 1, so a relative one of 1.2e-7 / (1 - F) in what is left.
+fn refracted(surface: &bindings::Surface, wi: DVec3, wo: DVec3) -> f64 {
+    let eta = if wi.z > 0.0 { surface.eta } else { 1.0 / surface.eta };
+    let m = (wi + wo * if wi.z * wo.z > 0.0 { 1.0 } else { eta }).normalize();
+    let m = if m.z < 0.0 { -m } else { m };
+    let left = |cosine: f64| 1.0 - fresnel_dielectric(cosine, surface.eta).0;
+    let parts = [left(wi.z), left(wo.z), left(wi.dot(m))];
+    if surface.eta == 0.0 { 0.0 } else { parts.iter().filter(|part| **part > 0.0).map(|part| 1.2e-7 / part).sum() }
+}
+
+struct Functions {
+    all: Vec<(&'static str, Comparison)>,
+}
+
+impl Functions {
+    fn new(names: &[&'static str]) -> Functions {
+        Functions { all: names.iter().map(|name| (*name, comparison(name))).collect() }
+    }
+
+    fn of(&mut self, name: &str) -> &mut Comparison {
+        &mut self.all.iter_mut().find(|(known, _)| *known == name).expect("it is listed").1
+    }
+
+    /// A number with all values that it has for inputs nearby.
+    fn near(&mut self, name: &str, case: &str, got: f32, want: f64, moved: &[f64]) {
+        let got = explained(got, want, moved.iter().copied());
+        self.of(name).scalar(case, got, want);
+    }
+
+    fn near_vector(&mut self, name: &str, case: &str, got: [f32; 3], want: DVec3, moved: &[DVec3]) {
+        let got = [0, 1, 2].map(|k| explained(got[k], want[k], moved.iter().map(|moved| moved[k])));
+        self.of(name).vector(case, &got, want);
+    }
+
+    fn finish(self) {
+        self.all.into_iter().for_each(|(_, comparison)| comparison.finish());
+    }
+}
+
+fn queries(surfaces: &[Surface]) -> Vec<Query> {
+    let mut random = Random(61);
+    let numbers = [0.0, 1.0 / 16_777_216.0, 0.5, 0.999, LAST];
+    let mut queries = Vec::new();
+    for (index, surface) in surfaces.iter().enumerate() {
+        let eta = f64::from(surface.eta).max(0.1);
+        for wi in directions(&mut random, eta) {
+            for k in 0..12 {
+                let wo = match k % 3 {
+                    0 => random.direction(),
+                    // Near the mirror's direction, and near that of refraction.
+                    1 => single((v(-wi.x, -wi.y, wi.z) + random.in_cube() * f64::from(surface.alpha)).normalize()),
+                    _ => {
+                        let (_, cos_t) = fresnel_dielectric(wi.z, eta);
+                        let scale = if wi.z >= 0.0 { 1.0 / eta } else { eta };
+                        let straight = v(-wi.x * scale, -wi.y * scale, cos_t);
+                        single((straight + random.in_cube() * f64::from(surface.alpha)).normalize())
+                    }
+                };
+                let u = if k < 5 { [numbers[k], random.unit()] } else { [random.unit(), numbers[k % 5]] };
+                let lobe = if k == 7 {
+                    0.0
+                } else if k == 8 {
+                    LAST
+                } else {
+                    random.unit()
+                };
+                queries.push(Query { surface: index, wi, wo, u, lobe });
+            }
+        }
+    }
+    queries
+}
+
+#[test]
+fn facets_and_fresnel() {
+    let surfaces = surfaces();
+    let queries = queries(&surfaces);
+    let names = [
+        "fresnel_dielectric",
+        "cosine of refraction",
+        "fresnel_conductor",
+        "sample_facet",
+        "facet_density",
+        "facet_masking",
+    ];
+    let mut functions = Functions::new(&names);
+    for (query, answer) in queries.iter().zip(ask(&surfaces, &queries)) {
+        let surface = bindings::Surface::from(&surfaces[query.surface]);
+        let (ggx, alpha) = (surface.flags & SURFACE_GGX != 0, surface.alpha);
+        let case = format!("{query:?}");
+        if surface.eta > 0.0 {
+            let (f, cos_t) = fresnel_dielectric(query.wi.z, surface.eta);
+            let moved: Vec<(f64, f64)> =
+                nudged(query.wi).map(|wi| fresnel_dielectric(wi.z.clamp(-1.0, 1.0), surface.eta)).collect();
+            let [fs, cosines] = [|pair: &(f64, f64)| pair.0, |pair: &(f64, f64)| pair.1]
+                .map(|part| moved.iter().map(part).collect::<Vec<f64>>());
+            functions.near("fresnel_dielectric", &case, answer.fresnel, f, &fs);
+            functions.near("cosine of refraction", &case, answer.cos_t, cos_t, &cosines);
+        }
+        if surface.transmittance != DVec3::ZERO && surface.extinction != DVec3::ZERO {
+            let expected = fresnel_conductor(query.wi.z.abs(), surface.transmittance, surface.extinction);
+            functions.of("fresnel_conductor").vector(&case, &answer.conductor, expected);
+        }
+        if alpha > 0.0 {
+            let expected = sample_facet(DVec2::from_array(query.u), alpha, ggx);
+            functions.of("sample_facet").vector(&case, &answer.facet, expected);
+            // Of the facet that the kernel found: rounding it is not an error of the function.
+            let m = widen(&answer.facet);
+            functions.of("facet_density").scalar(&case, answer.density, facet_density(m, alpha, ggx));
+            for (w, found) in [query.wi, query.wo].into_iter().zip(answer.masking) {
+                let moved: Vec<f64> = nudged(w).map(|w| facet_masking(w, m, alpha, ggx)).collect();
+                functions.near("facet_masking", &case, found, facet_masking(w, m, alpha, ggx), &moved);
+            }
+        }
+    }
+    functions.finish();
+}
+
+#[test]
+fn surfaces_scatter_as_the_reference() {
+    let surfaces = surfaces();
+    let queries = queries(&surfaces);
+    let names = ["eval_bsdf value", "eval_bsdf pdf", "sample_bsdf direction", "sample_bsdf pdf", "sample_bsdf weight"];
+    let mut functions = Functions::new(&names);
+    let mut failed = 0;
+    for (query, answer) in queries.iter().zip(ask(&surfaces, &queries)) {
+        let surface = bindings::Surface::from(&surfaces[query.surface]);
+        let case = format!("{query:?}, {:?}", surfaces[query.surface]);
+        let Query { wi, wo, lobe, .. } = *query;
+        let u = DVec2::from_array(query.u);
+        // Both directions moved by the rounding of single precision.
+        let around = |wo: DVec3| {
+            let pairs = nudged(wi).map(|wi| (wi, wo)).chain(nudged(wo).map(|wo| (wi, wo)));
+            let value = eval_bsdf(&surface, wi, wo);
+            let factor = 1.0 + refracted(&surface, wi, wo);
+            let dimmed = BsdfValue { value: value.value * factor, pdf: value.pdf * factor };
+            // Value and density may lose of it separately.
+            let apart = BsdfValue { value: value.value * factor, pdf: value.pdf / factor };
+            pairs.map(|(wi, wo)| eval_bsdf(&surface, wi, wo)).chain([dimmed, apart]).collect::<Vec<_>>()
+        };
+        let (asked, moved) = (eval_bsdf(&surface, wi, wo), around(wo));
+        let values: Vec<DVec3> = moved.iter().map(|moved| moved.value).collect();
+        let pdfs: Vec<f64> = moved.iter().map(|moved| moved.pdf).collect();
+        functions.near_vector("eval_bsdf value", &case, answer.value, asked.value, &values);
+        functions.near("eval_bsdf pdf", &case, answer.value_pdf, asked.pdf, &pdfs);
+
+        let found = sample_bsdf(&surface, wi, u, lobe);
+        let turned = [-2.4e-7, 2.4e-7].map(|step| DVec2::new(u.x, u.y + step));
+        let moved: Vec<_> = nudged(wi)
+            .map(|wi| sample_bsdf(&surface, wi, u, lobe))
+            .chain(turned.map(|u| sample_bsdf(&surface, wi, u, lobe)))
+            .chain([-4e-6, 4e-6].map(|step| {
+                // The tangent of the facet, whose error sample_facet declares.
+                let other = bindings::Surface { alpha: surface.alpha * (1.0 + step), ..surface };
+                sample_bsdf(&other, wi, u, lobe)
+            }))
+            .chain([-1e-6, 1e-6].map(|step| sample_bsdf(&surface, wi, u, lobe + step)))
+            .collect();
+        // At the border of two lobes, or of failure, either is right.
+        let vanishes = found.pdf > 0.0 && around(found.direction).iter().any(|moved| moved.pdf <= 0.0);
+        let flips = moved.iter().any(|moved| {
+            moved.eta != found.eta || (moved.weight - found.weight).length() > 1e-2 * found.weight.length()
+        });
+        if flips || vanishes {
+            continue;
+        }
+        failed += u32::from(answer.failed());
+        let directions: Vec<DVec3> = moved.iter().map(|moved| moved.direction).collect();
+        functions.near_vector("sample_bsdf direction", &case, answer.direction, found.direction, &directions);
+        assert_eq!(answer.eta, found.eta as f32, "{case}");
+        assert_eq!(answer.pdf > 0.0, found.pdf > 0.0, "{case}: {answer:?}, expected {found:?}");
+        if found.pdf > 0.0 {
+            // Of the direction that the kernel found.
+            let (expected, moved) = (eval_bsdf(&surface, wi, answer.wo()), around(answer.wo()));
+            let weights: Vec<DVec3> =
+                moved.iter().filter(|moved| moved.pdf > 0.0).map(|moved| moved.value / moved.pdf).collect();
+            let pdfs: Vec<f64> = moved.iter().map(|moved| moved.pdf).collect();
+            functions.near("sample_bsdf pdf", &case, answer.pdf, expected.pdf, &pdfs);
+            let weight = expected.value / expected.pdf;
+            functions.near_vector("sample_bsdf weight", &case, answer.weight, weight, &weights);
+        } else {
+            let weights: Vec<DVec3> = moved.iter().map(|moved| moved.weight).collect();
+            functions.near_vector("sample_bsdf weight", &case, answer.weight, found.weight, &weights);
+        }
+    }
+    assert!(failed > 100, "samples that fail are compared as well");
+    functions.finish();
+}
