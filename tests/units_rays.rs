@@ -172,7 +172,7 @@ fn octahedron() -> Mesh {
         let even = (x % 2 + y % 2 + z % 2) % 2 == 0;
         triangles.push(if even { [x, y, z] } else { [x, z, y] });
     }
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 #[test]
