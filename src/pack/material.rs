@@ -81,6 +81,10 @@ fn metal(eta: DVec3, k: DVec3, reflectance: &Texture, two_sided: bool) -> Surfac
 }
 
 fn rough(smooth: Surface, roughness: &Roughness) -> Surface {
+    // Facets between equal indices neither bend nor reflect, however they lie.
+    if smooth.flags >> SURFACE_KIND_SHIFT == BSDF_DIELECTRIC && smooth.eta == 1.0 {
+        return smooth;
+    }
     let ggx = if roughness.distribution == Distribution::Ggx { SURFACE_GGX } else { 0 };
     Surface { flags: smooth.flags | ggx, alpha: roughness.alpha_u as f32, ..smooth }
 }
