@@ -136,9 +136,9 @@ BsdfValue eval_bsdf(Surface surface, vec3 wi, vec3 wo) {
         if (wi.z <= 0.0 || wo.z <= 0.0) {
             return none;
         }
-        float fi = fresnel_dielectric(wi.z, surface.eta, unused), fo = fresnel_dielectric(wo.z, surface.eta, unused);
-        float diffuse_probability = 1.0 - plastic_specular_probability(surface, fi);
-        vec3 value = plastic_diffuse(surface, fi, fo) * (wo.z * INV_PI);
+        float fresnel_i = fresnel_dielectric(wi.z, surface.eta, unused), fresnel_o = fresnel_dielectric(wo.z, surface.eta, unused);
+        float diffuse_probability = 1.0 - plastic_specular_probability(surface, fresnel_i);
+        vec3 value = plastic_diffuse(surface, fresnel_i, fresnel_o) * (wo.z * INV_PI);
         float pdf = diffuse_probability * wo.z * INV_PI;
         if (surface.alpha > 0.0) {
             vec3 m = normalize(wi + wo);

@@ -168,10 +168,10 @@ pub fn eval_bsdf(surface: &Surface, wi: DVec3, wo: DVec3) -> BsdfValue {
 }
 
 fn eval_plastic(surface: &Surface, wi: DVec3, wo: DVec3) -> BsdfValue {
-    let (fi, _) = fresnel_dielectric(wi.z, surface.eta);
-    let (fo, _) = fresnel_dielectric(wo.z, surface.eta);
-    let diffuse_probability = 1.0 - plastic_specular_probability(surface, fi);
-    let mut value = plastic_diffuse(surface, fi, fo) * (wo.z * FRAC_1_PI);
+    let (fresnel_i, _) = fresnel_dielectric(wi.z, surface.eta);
+    let (fresnel_o, _) = fresnel_dielectric(wo.z, surface.eta);
+    let diffuse_probability = 1.0 - plastic_specular_probability(surface, fresnel_i);
+    let mut value = plastic_diffuse(surface, fresnel_i, fresnel_o) * (wo.z * FRAC_1_PI);
     let mut pdf = diffuse_probability * wo.z * FRAC_1_PI;
     if surface.alpha > 0.0 {
         let m = (wi + wo).normalize();
