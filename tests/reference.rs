@@ -20,6 +20,25 @@ fn device_and_reference_follow_the_same_paths() {
 }
 
 #[test]
+fn samples_that_are_not_numbers_are_counted() {
+    use tyndall::render::Backend;
+    let mut packed = scenes::pack(&scenes::gray_box(), 9);
+    let invalid = |packed: &tyndall::pack::Packed| {
+        let mut renderer = tyndall::gpu::Renderer::new(device(), packed).expect("the kernels compile");
+        let on_device = renderer.render(0..16).expect("it renders")[0].invalid;
+        let mut reference = tyndall::reference::Renderer::new(packed.clone());
+        [on_device, reference.render(0..16).expect("it renders")[0].invalid]
+    };
+    assert_eq!(invalid(&packed), [[0; 3]; 2]);
+    for surface in &mut packed.surfaces {
+        surface.reflectance.y = f32::NAN;
+    }
+    for counts in invalid(&packed) {
+        assert!(counts[0] > 0, "{counts:?}");
+    }
+}
+
+#[test]
 fn more_features_than_needed_do_not_change_the_image() {
     for (name, scene) in scenes::all() {
         let packed = scenes::pack(&scene, 8);

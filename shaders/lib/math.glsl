@@ -52,6 +52,12 @@ vec3 to_frame(vec3 axis, vec3 direction) {
     return vec3(dot(tangent, direction), dot(bitangent, direction), dot(axis, direction));
 }
 
+// By bit pattern: compilers may assume that numbers are finite.
+bool is_finite(vec3 v) {
+    uvec3 exponent = floatBitsToUint(v) & 0x7f800000u;
+    return all(notEqual(exponent, uvec3(0x7f800000u)));
+}
+
 float max_component(vec3 v) {
     return max(v.x, max(v.y, v.z));
 }

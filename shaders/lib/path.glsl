@@ -281,7 +281,7 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u, float lobe) {
     path.pdf_ratio = found.pdf > 0.0 ? scattering.pdf / (found.pdf * light.probability) : 0.0;
     path.light_medium = medium_towards(vertex, path.medium, found.direction);
     path.origin = offset_origin(path, found.direction);
-    return max_component(path.light_weight) > 0.0;
+    return max_component(path.light_weight) > 0.0 || !is_finite(path.light_weight);
 }
 
 // Scatters at a vertex: the shadow ray, the next direction, roulette.
@@ -306,6 +306,11 @@ void scatter(inout Path path, Vertex vertex) {
     path.pdf = next.pdf;
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
+    if (!is_finite(path.throughput)) {
+        // The sample is lost, and must be seen to be: no comparison may drop it.
+        path.radiance += path.throughput;
+        path.alive = false;
+    }
 }
 
 // Begins the segment after a vertex, unless roulette ends the path.

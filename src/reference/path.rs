@@ -302,7 +302,7 @@ fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2,
     path.pdf_ratio = if found.pdf > 0.0 { scattering.pdf / (found.pdf * light.probability) } else { 0.0 };
     path.light_medium = medium_towards(vertex, path.medium, found.direction);
     path.origin = offset_origin(path, found.direction);
-    max_component(path.light_weight) > 0.0
+    max_component(path.light_weight) > 0.0 || !path.light_weight.is_finite()
 }
 
 /// Scatters at a vertex: the shadow ray, the next direction, roulette.
@@ -328,6 +328,11 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     path.pdf = next.pdf;
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
+    if !path.throughput.is_finite() {
+        // The sample is lost, and must be seen to be: no comparison may drop it.
+        path.radiance += path.throughput;
+        path.alive = false;
+    }
 }
 
 /// Begins the segment after a vertex, unless roulette ends the path.
