@@ -31,7 +31,7 @@ fn samples_that_are_not_numbers_are_counted() {
     };
     assert_eq!(invalid(&packed), [[0; 3]; 2]);
     for surface in &mut packed.surfaces {
-        surface.reflectance.y = f32::NAN;
+        surface.reflectance = glam::Vec3::NAN;
     }
     for counts in invalid(&packed) {
         assert!(counts[0] > 0, "{counts:?}");
