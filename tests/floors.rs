@@ -85,7 +85,11 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("bsdf", &["math", "warp"]),
     ("light", &["math", "warp"]),
     ("medium", &["math"]),
-    ("path", &["math", "sampler", "warp", "ray", "camera", "medium", "phase", "bsdf", "light"]),
+    ("path_state", &["math", "sampler", "medium"]),
+    ("path_vertex", &["path_state", "warp", "ray", "phase", "bsdf"]),
+    ("path_lights", &["path_state", "path_vertex", "light"]),
+    ("path_rays", &["path_state", "ray"]),
+    ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "camera"]),
 ];
 const ALL_MAY_INCLUDE: &[&str] = &["constants", "layout", "features", "sobol"];
 
@@ -142,7 +146,11 @@ fn every_concept_has_a_mirror_and_a_unit_kernel() {
     let concepts = without(names("shaders/lib", ".glsl"), &["constants"]);
     assert_eq!(without(names("src/reference", ".rs"), &["mod"]), concepts, "mirrors of concepts");
     // The path and its bindings are tested as a whole, by images.
-    assert_eq!(names("shaders/units", ".comp"), without(concepts, &["path", "bindings"]), "unit kernels of concepts");
+    assert_eq!(
+        names("shaders/units", ".comp"),
+        without(concepts, &["path", "path_lights", "path_rays", "path_state", "path_vertex", "bindings"]),
+        "unit kernels of concepts"
+    );
 }
 
 #[test]

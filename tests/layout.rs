@@ -9,7 +9,9 @@ use std::collections::BTreeSet;
 use tyndall::gpu::shader::{SOURCES, ShaderSourceText, Variant, compile, expand};
 use tyndall::gpu_struct;
 use tyndall::pack::features::Features;
-use tyndall::pack::layout::{Dispatch, Field, GpuStruct, Light, Medium, Params, Primitive, Surface};
+use tyndall::pack::layout::{
+    Corners, Dispatch, Field, GpuStruct, Light, Medium, Params, Phase, Primitive, Surface, Texture,
+};
 
 /// A shared struct as Rust has it.
 struct Expected {
@@ -27,6 +29,9 @@ fn shared_structs() -> Vec<Expected> {
         expected::<Primitive>(),
         expected::<Surface>(),
         expected::<Medium>(),
+        expected::<Phase>(),
+        expected::<Corners>(),
+        expected::<Texture>(),
         expected::<Light>(),
         expected::<Params>(),
         expected::<Dispatch>(),
@@ -180,12 +185,12 @@ fn a_struct_that_differs_is_noticed() {
     let mut fields = Medium::FIELDS.to_vec();
     fields[3].offset += 4;
     check(&module, &[Expected { fields: fields.leak(), ..medium() }]).expect_err("another offset");
-    check(&module, &[Expected { size: 48, ..medium() }]).expect_err("another size");
+    check(&module, &[Expected { size: 64, ..medium() }]).expect_err("another size");
 }
 
 #[test]
 fn push_constants_begin_with_the_addresses() {
-    for (name, offset) in [("path_trace.comp", 64), ("resolve.comp", 0)] {
+    for (name, offset) in [("path_trace.comp", 96), ("resolve.comp", 0)] {
         let source = expand(name, &units::variant()).expect("it expands");
         let module = reflect(&source).unwrap_or_else(|why| panic!("{why}"));
         let push = module

@@ -14,6 +14,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Su
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MediaAddress { Medium at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LightsAddress { Light at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PointsAddress { uvec2 at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PhasesAddress { Phase at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer CornersAddress { Corners at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer TexturesAddress { Texture at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ValuesAddress { float at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer SamplesAddress { vec4 at[]; };
 layout(push_constant) uniform Push {
     NodesAddress nodes;
@@ -22,6 +26,10 @@ layout(push_constant) uniform Push {
     MediaAddress media;
     LightsAddress lights;
     PointsAddress points;
+    PhasesAddress phases;
+    CornersAddress corners;
+    TexturesAddress textures;
+    ValuesAddress values;
     SamplesAddress samples;
     uvec2 unused;
     Dispatch work;
@@ -41,6 +49,10 @@ Primitive load_primitive(uint i) {
 #define MEDIUM(i) push.media.at[i]
 #define LIGHT(i) push.lights.at[i]
 #define POINT(i) push.points.at[i]
+#define PHASE(i) push.phases.at[i]
+#define CORNERS(i) push.corners.at[i]
+#define TEXTURE(i) push.textures.at[i]
+#define VALUE(i) push.values.at[i]
 #define SAMPLE(i) push.samples.at[i]
 #else
 layout(set = 0, binding = 0, std430) readonly buffer Nodes { uvec4 nodes[]; };
@@ -49,9 +61,13 @@ layout(set = 0, binding = 2, std430) readonly buffer Surfaces { Surface surfaces
 layout(set = 0, binding = 3, std430) readonly buffer Media { Medium media[]; };
 layout(set = 0, binding = 4, std430) readonly buffer Lights { Light lights[]; };
 layout(set = 0, binding = 5, std430) readonly buffer Points { uvec2 points[]; };
-layout(set = 0, binding = 6, std430) buffer Samples { vec4 samples[]; };
+layout(set = 0, binding = 6, std430) readonly buffer Phases { Phase phases[]; };
+layout(set = 0, binding = 7, std430) readonly buffer CornersOfAll { Corners corners[]; };
+layout(set = 0, binding = 8, std430) readonly buffer Textures { Texture textures[]; };
+layout(set = 0, binding = 9, std430) readonly buffer Values { float values[]; };
+layout(set = 0, binding = 10, std430) buffer Samples { vec4 samples[]; };
 layout(push_constant) uniform Push {
-    uvec4 addresses[4];
+    uvec4 addresses[6];
     Dispatch work;
 } push;
 #define NODE(i) nodes[i]
@@ -60,6 +76,10 @@ layout(push_constant) uniform Push {
 #define MEDIUM(i) media[i]
 #define LIGHT(i) lights[i]
 #define POINT(i) points[i]
+#define PHASE(i) phases[i]
+#define CORNERS(i) corners[i]
+#define TEXTURE(i) textures[i]
+#define VALUE(i) values[i]
 #define SAMPLE(i) samples[i]
 #endif
-layout(set = 0, binding = 7, std430) readonly buffer ParamsBuffer { Params params; };
+layout(set = 0, binding = 11, std430) readonly buffer ParamsBuffer { Params params; };

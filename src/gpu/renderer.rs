@@ -14,8 +14,8 @@ use std::sync::Arc;
 /// Most samples in flight: their radiances take 16 bytes each.
 const MAX_SAMPLES: usize = 1 << 22;
 /// Bindings of the path tracer; the first [`ADDRESSES`] can also be read by address.
-const BINDINGS: u32 = 8;
-const ADDRESSES: usize = 7;
+const BINDINGS: u32 = 12;
+const ADDRESSES: usize = 11;
 /// Bytes of the addresses in the push constants, a multiple of 16.
 const ADDRESS_BYTES: usize = (ADDRESSES * 8).next_multiple_of(16);
 const TILE_PIXELS: usize = (TILE * TILE) as usize;
@@ -25,8 +25,8 @@ pub struct Renderer {
     device: Arc<Device>,
     path_trace: Kernel,
     resolve: Kernel,
-    /// Nodes, primitives, surfaces, media, lights, low-discrepancy points: the tables that kernels only read.
-    tables: [Buffer; 6],
+    /// The tables that kernels only read, in the order of their bindings.
+    tables: [Buffer; 10],
     params: Buffer,
     samples: Buffer,
     sums: Buffer,
@@ -61,6 +61,10 @@ impl Renderer {
             Buffer::new(device, "media", &packed.media)?,
             Buffer::new(device, "lights", &packed.lights)?,
             Buffer::new(device, "points", &sobol::points())?,
+            Buffer::new(device, "phases", &packed.phases)?,
+            Buffer::new(device, "corners", &packed.corners)?,
+            Buffer::new(device, "textures", &packed.textures)?,
+            Buffer::new(device, "values", &packed.values)?,
         ];
         let crop = [packed.params.crop_width, packed.params.crop_height];
         let pixels = tile_count(crop) as usize * TILE_PIXELS;
@@ -95,8 +99,7 @@ impl Renderer {
             tile_step: coprime_step(tile_count),
             ..Dispatch::default()
         };
-        let [nodes, primitives, surfaces, media, lights, points] = &self.tables;
-        let buffers = [nodes, primitives, surfaces, media, lights, points, &self.samples, &self.params];
+        let buffers: Vec<&Buffer> = self.tables.iter().chain([&self.samples, &self.params]).collect();
         let mut addresses = [0u64; ADDRESS_BYTES / 8];
         if self.device.buffer_reference {
             for (address, buffer) in addresses.iter_mut().zip(&buffers[..ADDRESSES]) {

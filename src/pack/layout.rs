@@ -133,12 +133,12 @@ gpu_struct! {
         internal_reflectance: f32,
         /// Of plastic, the share of the specular lobe in sampling, before Fresnel.
         specular_weight: f32,
-        /// Fills the sixteen bytes.
-        unused_1: u32,
-        /// Fills the sixteen bytes.
-        unused_2: u32,
-        /// Fills the sixteen bytes.
-        unused_3: u32,
+        /// Roughness across the tangent, where it differs from `alpha`; else the same.
+        alpha_v: f32,
+        /// Textures that stand for `reflectance` (low 16 bits) and `specular` (high 16 bits), plus one; 0 is none.
+        textures_1: u32,
+        /// Textures of `transmittance` (low 16 bits) and of the opacity (high 16 bits), plus one; 0 is none.
+        textures_2: u32,
     }
 }
 
@@ -151,8 +151,87 @@ gpu_struct! {
         g: f32,
         /// Single-scattering albedo.
         albedo: Vec3,
+        /// 0: the phase function is Henyey and Greenstein's with `g`. Else it is a mixture of entries of the table of phase
+        /// functions: index of the first plus one (low 24 bits), their number (high 8 bits).
+        phase: u32,
+        /// Radiance that is added per canonical unit of length.
+        emission: Vec3,
+        /// Index of the light that stands for the medium's emission, plus one; 0 if it does not emit or is not sampled.
+        light: u32,
+    }
+}
+
+gpu_struct! {
+    /// A component of a mixture of phase functions.
+    pub struct Phase {
+        /// One of the `PHASE_` constants.
+        kind: u32,
+        /// Share in the mixture; the shares of one mixture add up to 1.
+        weight: f32,
+        /// Mean cosine of Henyey and Greenstein's.
+        g: f32,
+        /// Of a table: index of its first number among the values.
+        first_value: u32,
+        /// Of a table: numbers in it.
+        value_count: u32,
+        /// Fills the sixteen bytes.
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
+        /// Fills the sixteen bytes.
+        unused_3: u32,
+    }
+}
+
+gpu_struct! {
+    /// What the corners of a triangle carry beside their places. Entry k belongs to primitive k.
+    pub struct Corners {
+        /// Shading normal of the first corner; 0 if the triangle is flat.
+        normal_a: Vec3,
+        /// Its first texture coordinate.
+        u_a: f32,
+        /// Shading normal of the second corner.
+        normal_b: Vec3,
+        /// Its first texture coordinate.
+        u_b: f32,
+        /// Shading normal of the third corner.
+        normal_c: Vec3,
+        /// Its first texture coordinate.
+        u_c: f32,
+        /// Second texture coordinates of the three corners.
+        v: Vec3,
         /// Fills the sixteen bytes.
         unused: u32,
+    }
+}
+
+gpu_struct! {
+    /// A colour that depends on the place, or the pixels of an environment map.
+    pub struct Texture {
+        /// u of the look-up is `row_u · (u, v, 1)`.
+        row_u: Vec3,
+        /// One of the `TEXTURE_` constants.
+        kind: u32,
+        /// v of the look-up is `row_v · (u, v, 1)`.
+        row_v: Vec3,
+        /// Bits of filter and wrap mode.
+        flags: u32,
+        /// Of a checkerboard: the colour at (0, 0).
+        color_0: Vec3,
+        /// Of an image: pixels in a row.
+        width: u32,
+        /// Of a checkerboard: the other colour.
+        color_1: Vec3,
+        /// Of an image: rows.
+        height: u32,
+        /// Of an image: index of its first number among the values; three for each pixel, row by row.
+        first_value: u32,
+        /// Of an environment map: index of the first number of its distribution among the values.
+        first_weight: u32,
+        /// Fills the sixteen bytes.
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
     }
 }
 
@@ -295,8 +374,18 @@ pub const INFINITE_DISTANCE: f32 = 1e30;
 
 /// The text of `layout.glsl`: all shared structs and constants.
 pub fn glsl() -> String {
-    let structs =
-        [Primitive::glsl(), Surface::glsl(), Medium::glsl(), Light::glsl(), Params::glsl(), Dispatch::glsl()].concat();
+    let structs = [
+        Primitive::glsl(),
+        Surface::glsl(),
+        Medium::glsl(),
+        Phase::glsl(),
+        Corners::glsl(),
+        Texture::glsl(),
+        Light::glsl(),
+        Params::glsl(),
+        Dispatch::glsl(),
+    ]
+    .concat();
     let constants = [
         ("PRIMITIVE_BOUNDARY", PRIMITIVE_BOUNDARY),
         ("PRIMITIVE_SPHERE", PRIMITIVE_SPHERE),

@@ -1,6 +1,6 @@
 //! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
 
-use crate::scene::{Bsdf, Geometry, MediumId, Phase, Scene, Shape};
+use crate::scene::{self, Bsdf, Geometry, MediumId, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
@@ -35,6 +35,14 @@ pub struct Packed {
     pub media: Vec<Medium>,
     /// Lights that can be sampled.
     pub lights: Vec<Light>,
+    /// Components of mixtures of phase functions.
+    pub phases: Vec<layout::Phase>,
+    /// One for each primitive, or none at all where no shape needs them.
+    pub corners: Vec<Corners>,
+    /// Images and patterns.
+    pub textures: Vec<Texture>,
+    /// Numbers of any length that the other tables refer to: pixels, tabulated functions, distributions.
+    pub values: Vec<f32>,
     /// The rest.
     pub params: Params,
     /// What the kernel must be able to do.
@@ -115,7 +123,22 @@ impl Packed {
         };
         let warnings = [nesting.warnings, simplified].concat();
         let features = EMPTY_FEATURES;
-        let mut packed = Packed { frame, bvh, primitives, surfaces, media, lights, params, features, warnings };
+        let (phases, corners, textures, values) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut packed = Packed {
+            frame,
+            bvh,
+            primitives,
+            surfaces,
+            media,
+            lights,
+            phases,
+            corners,
+            textures,
+            values,
+            params,
+            features,
+            warnings,
+        };
         packed.features = Features::of(scene, &packed);
         Ok(packed)
     }
@@ -164,11 +187,11 @@ fn pack_media(scene: &Scene, frame: &Frame) -> Result<Vec<Medium>, PackError> {
             return Err(PackError::OutOfRange { what: "sigma_t", name: medium.name.clone(), value });
         }
         let g = match medium.phase {
-            Phase::HenyeyGreenstein { g } => nearest_below_one(g),
+            scene::Phase::HenyeyGreenstein { g } => nearest_below_one(g),
             // `support` has refused all others.
             _ => 0.0,
         };
-        media.push(Medium { sigma_t, g, albedo: medium.albedo.as_vec3(), unused: 0 });
+        media.push(Medium { sigma_t, g, albedo: medium.albedo.as_vec3(), ..Medium::default() });
     }
     Ok(media)
 }

@@ -17,6 +17,14 @@ pub struct Tables {
     pub media: Vec<Medium>,
     /// Lights that can be sampled.
     pub lights: Vec<Light>,
+    /// Components of mixtures of phase functions. Their numbers are few and used as they are.
+    pub phases: Vec<layout::Phase>,
+    /// One for each primitive, or none at all.
+    pub corners: Vec<layout::Corners>,
+    /// Images and patterns.
+    pub textures: Vec<layout::Texture>,
+    /// Pixels, tabulated functions, distributions.
+    pub values: Vec<f32>,
     /// Low-discrepancy points.
     pub points: Vec<[u32; 2]>,
     /// What holds for the whole render.
@@ -51,6 +59,9 @@ pub struct Surface {
     pub extinction: DVec3,
     pub internal_reflectance: f64,
     pub specular_weight: f64,
+    pub alpha_v: f64,
+    pub textures_1: u32,
+    pub textures_2: u32,
 }
 
 /// See [`layout::Medium`].
@@ -60,6 +71,9 @@ pub struct Medium {
     pub sigma_t: DVec3,
     pub g: f64,
     pub albedo: DVec3,
+    pub phase: u32,
+    pub emission: DVec3,
+    pub light: u32,
 }
 
 /// See [`layout::Light`].
@@ -112,6 +126,10 @@ impl Tables {
             surfaces: packed.surfaces.iter().map(Surface::from).collect(),
             media: packed.media.iter().map(Medium::from).collect(),
             lights: packed.lights.iter().map(Light::from).collect(),
+            phases: packed.phases.clone(),
+            corners: packed.corners.clone(),
+            textures: packed.textures.clone(),
+            values: packed.values.clone(),
             points: sobol::points(),
             params: Params::from(&packed.params),
             features: packed.features,
@@ -156,13 +174,23 @@ impl From<&layout::Surface> for Surface {
             extinction: from.extinction.as_dvec3(),
             internal_reflectance: f64::from(from.internal_reflectance),
             specular_weight: f64::from(from.specular_weight),
+            alpha_v: f64::from(from.alpha_v),
+            textures_1: from.textures_1,
+            textures_2: from.textures_2,
         }
     }
 }
 
 impl From<&layout::Medium> for Medium {
     fn from(from: &layout::Medium) -> Medium {
-        Medium { sigma_t: from.sigma_t.as_dvec3(), g: f64::from(from.g), albedo: from.albedo.as_dvec3() }
+        Medium {
+            sigma_t: from.sigma_t.as_dvec3(),
+            g: f64::from(from.g),
+            albedo: from.albedo.as_dvec3(),
+            phase: from.phase,
+            emission: from.emission.as_dvec3(),
+            light: from.light,
+        }
     }
 }
 

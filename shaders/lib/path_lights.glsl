@@ -1,0 +1,83 @@
+// How a path comes to light: by chance, or by light sampling at its vertices. Both together are weighted by multiple importance
+// sampling (Veach and Guibas 1995).
+#include "lib/path_state.glsl"
+#include "lib/path_vertex.glsl"
+#include "lib/light.glsl"
+
+// Weight of a direction found by scattering that light sampling finds with density light_pdf: the balance heuristic (Veach and
+// Guibas 1995). Scattering finds the light only if the flight survives, so its probability to do so is part of the density.
+float scattering_mis_weight(Path path, float survival, float light_pdf) {
+    float found = path.pdf * survival;
+    return path.pdf == 0.0 || light_pdf == 0.0 ? 1.0 : found / (found + light_pdf);
+}
+
+bool emitters_seen(Path path) {
+    return !(HAS_HIDDEN_EMITTERS && path.depth == 0u);
+}
+
+// Adds the constant light to a path that leaves the scene.
+void add_constant_light(inout Path path) {
+    if (!HAS_CONSTANT_LIGHT || !emitters_seen(path)) {
+        return;
+    }
+    for (uint i = 0u; i < params.light_count; ++i) {
+        Light light = LIGHT(i);
+        if (light.kind == LIGHT_CONSTANT) {
+            // Light sampling takes its directions from the same scattering function (see sample_light).
+            float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * path.pdf : 0.0;
+            path.radiance += survived_throughput(path) * light.radiance * scattering_mis_weight(path, survival(path), light_pdf);
+        }
+    }
+}
+
+// Adds what a primitive emits towards the path.
+void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
+    float cos_light = -dot(path.direction, normal);
+    if (!HAS_AREA_LIGHTS || primitive.light == 0u || cos_light <= 0.0 || !emitters_seen(path)) {
+        return;
+    }
+    Light light = LIGHT(primitive.light - 1u);
+    float pdf = HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE
+        ? sphere_light_pdf(light.edge_1.x, distance(path.origin, light.origin))
+        : area_pdf(light.area, t, cos_light);
+    float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * pdf : 0.0;
+    path.radiance += survived_throughput(path) * light.radiance * scattering_mis_weight(path, survival(path), light_pdf);
+}
+
+// Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.
+bool sample_light(inout Path path, Vertex vertex, vec2 u, float lobe) {
+    if (!HAS_LIGHT_SAMPLING) {
+        return false;
+    }
+    uint index = 0u;
+    if (HAS_MANY_LIGHTS) {
+        index = alias_line(params.light_count, u.x);
+        Light line = LIGHT(index);
+        index = alias_keeps(line.alias_threshold, u.x) ? index : line.alias;
+    }
+    Light light = LIGHT(index);
+    LightSample found;
+    if (HAS_CONSTANT_LIGHT && light.kind == LIGHT_CONSTANT) {
+        // No direction is better than another, so the scattering function samples them; what light sampling adds is the
+        // transmittance, exact instead of 0 or 1.
+        BsdfSample scattered = sample_scattering(vertex, u, lobe);
+        vec3 weight = scattered.pdf > 0.0 ? light.radiance / scattered.pdf : vec3(0.0);
+        found = LightSample(scattered.direction, INFINITE_DISTANCE, weight, scattered.pdf);
+    } else if (HAS_POINT_LIGHTS && light.kind == LIGHT_POINT) {
+        found = sample_point_light(light, vertex.point);
+    } else if (HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE) {
+        found = sample_sphere_light(light, vertex.point, u);
+    } else {
+        found = sample_plane_light(light, vertex.point, u);
+    }
+    BsdfValue scattering = eval_scattering(vertex, found.direction);
+    path.direction = found.direction;
+    path.t_max = found.distance;
+    path.light = index;
+    path.light_channels = path.throughput * scattering.value;
+    path.light_weight = path.light_channels * found.weight / light.probability;
+    path.pdf_ratio = found.pdf > 0.0 ? scattering.pdf / (found.pdf * light.probability) : 0.0;
+    path.light_medium = medium_towards(vertex, path.medium, found.direction);
+    path.origin = offset_origin(path, found.direction);
+    return max_component(path.light_weight) > 0.0 || !is_finite(path.light_weight);
+}

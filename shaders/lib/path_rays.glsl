@@ -1,0 +1,69 @@
+// What a path's rays take from the primitives they meet: the nearest one, or, for shadow rays, everything in any order.
+#include "lib/path_state.glsl"
+#include "lib/ray.glsl"
+
+// The length L of a shadow ray in its optical depth sigma_0 L + sum (sigma_to - sigma_from) (L - t_i), in which the order of the
+// crossings does not matter. Where an infinite ray ends in vacuum, sigma_0 and the steps add up to 0 and any L serves.
+float shadow_length(Path path) {
+    return path.t_max >= INFINITE_DISTANCE ? 0.0 : path.t_max;
+}
+
+// An infinite ray that ends in a medium brings no light.
+vec3 depth_at_infinity(Path path) {
+    return path.t_max >= INFINITE_DISTANCE ? mix(vec3(0.0), vec3(INFINITE_DISTANCE), greaterThan(params.world_sigma_t, vec3(0.0))) : vec3(0.0);
+}
+
+// The state of a traversal before its first step.
+Hit begin_hit(Path path) {
+    Hit hit = Hit(path.t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false);
+    if (HAS_MEDIA && HAS_LIGHT_SAMPLING && path.shadow) {
+        uint medium = HAS_DIELECTRIC ? path.light_medium : path.medium;
+        vec3 tau = MEDIUM(valid_medium(medium)).sigma_t * shadow_length(path) + depth_at_infinity(path);
+        hit.tau = tau.x;
+        hit.tau_rgb = tau;
+    }
+    return hit;
+}
+
+// Takes one crossing with a primitive into account.
+void record(Path path, uint index, Primitive primitive, float t, bool along_normal, vec2 barycentric, inout Hit hit) {
+    // Distances first, the primitive's index among equals: surfaces that coincide are met one after the other, none twice.
+    bool begins = t > path.t_min || (t == path.t_min && index > path.last && path.last != NONE);
+    if (HAS_LIGHT_SAMPLING && path.shadow) {
+        bool boundary = HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u;
+        bool counts = begins && t < path.t_max;
+        if (HAS_BOUNDARIES && HAS_MEDIA) {
+            float way = (shadow_length(path) - t) * (along_normal ? -1.0 : 1.0);
+            hit.tau += counts && boundary ? primitive.sigma_t_step * way : 0.0;
+            if (HAS_CHROMATIC && counts && boundary) {
+                hit.tau_rgb += SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE)).sigma_t_step * way;
+            }
+        }
+        // The light itself is not in the way of its light.
+        hit.blocked = hit.blocked || (counts && !boundary && primitive.light != path.light + 1u);
+    } else if (begins && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE))) {
+        hit.t = t;
+        hit.primitive = index;
+        hit.along_normal = along_normal;
+        hit.barycentric = barycentric;
+    }
+}
+
+// Tests one primitive.
+void test_primitive(Path path, Ray ray, uint index, inout Hit hit) {
+    Primitive primitive = PRIMITIVE(index);
+    if (HAS_SPHERES && (primitive.surface & PRIMITIVE_SPHERE) != 0u) {
+        vec2 t = intersect_sphere(ray, primitive.a, primitive.b.x);
+        // A ray that touches the sphere in one point does not cross it: two crossings at one distance would count as one.
+        if (t.x < t.y) {
+            bool outwards = primitive.b.y > 0.0;
+            record(path, index, primitive, t.x, !outwards, vec2(0.0), hit);
+            record(path, index, primitive, t.y, outwards, vec2(0.0), hit);
+        }
+    } else {
+        TriangleHit found = intersect_triangle(ray, primitive.a, primitive.b, primitive.c);
+        if (found.hit) {
+            record(path, index, primitive, found.t, found.along_normal, found.barycentric, hit);
+        }
+    }
+}

@@ -1,0 +1,112 @@
+// What a path is between two rays, and its flight through media.
+#include "lib/math.glsl"
+#include "lib/sampler.glsl"
+#include "lib/medium.glsl"
+
+struct Path {
+    uint pixel;             // of the whole film
+    uint sample_index;
+    // The ray that is asked for.
+    vec3 origin;
+    vec3 direction;
+    float t_min;            // where the ray begins, or the last boundary on it
+    float t_max;            // the free flight, or the distance to the light
+    uint last;              // the boundary at t_min, or NONE
+    bool shadow;
+    // The path.
+    vec3 throughput;
+    vec3 radiance;
+    uint segment;           // counts the random numbers' sets
+    uint depth;             // scattering events so far
+    float pdf;              // density per solid angle of `direction`; 0 for a camera ray
+    bool alive;
+    // The medium and the flight through it. Scalars serve gray media, vectors chromatic ones.
+    uint medium;
+    float tau_left;         // optical depth, in the chosen channel, from t_min to the end of the flight
+    float tau;              // optical depth from the last event to t_min
+    vec3 tau_rgb;
+    uint channel;
+    float far_end;          // where the far clip plane ends a camera ray
+    // The shadow ray.
+    vec3 next_direction;
+    vec3 light_weight;      // what arrives if nothing is in the way
+    float pdf_ratio;        // density of the light's direction by scattering over that by light sampling; 0 for a point
+    uint light;             // the light it goes to
+    vec3 light_channels;    // chromatic media: the throughput that scattering towards the light would have
+    uint light_medium;      // where dielectrics are: the medium in which the shadow ray begins
+    // The vertex.
+    vec3 point;
+    float offset;           // of rays that leave a surface, along its normal; 0 in a medium
+    vec3 normal;            // only valid when offset > 0
+    uint next_medium;       // where dielectrics are: the medium of the next segment
+    float eta_scale;        // where dielectrics are: the product of squared indices that refraction divided radiance by
+};
+
+// What the traversal found.
+struct Hit {
+    float t;
+    uint primitive;         // NONE: nothing within t_max
+    bool along_normal;
+    vec2 barycentric;
+    float tau;              // shadow rays: optical depth
+    vec3 tau_rgb;
+    bool blocked;           // shadow rays: something is in the way
+};
+
+// The four numbers of a set.
+vec4 sample_set(Path path, uint set) {
+    uvec4 key = set_key(params.seed, path.pixel, set, path.sample_index);
+    uvec2 point = uvec2(0u);
+    if (set < SOBOL_SETS) {
+        point = POINT(point_index(set, path.sample_index, key));
+    }
+    return shifted_point(point, key);
+}
+
+uint valid_medium(uint medium) {
+    return medium < params.medium_count ? medium : 0u;
+}
+
+float channel_of(vec3 v, uint channel) {
+    return channel == 0u ? v.x : (channel == 1u ? v.y : v.z);
+}
+
+// Distance to the end of the flight with the extinction that holds from t_min on.
+float flight_end(Path path) {
+    if (!HAS_MEDIA) {
+        return path.far_end;
+    }
+    vec3 sigma_t = MEDIUM(valid_medium(path.medium)).sigma_t;
+    float sigma = HAS_CHROMATIC ? channel_of(sigma_t, path.channel) : sigma_t.x;
+    return min(path.t_min + free_flight(path.tau_left, sigma), path.far_end);
+}
+
+// A new segment along path.direction: its flight from two random numbers.
+void begin_segment(inout Path path, vec2 u) {
+    path.last = NONE;
+    path.shadow = false;
+    if (HAS_MEDIA) {
+        path.tau = 0.0;
+        path.tau_left = minus_log_1m(u.x);
+        if (HAS_CHROMATIC) {
+            path.tau_rgb = vec3(0.0);
+            path.channel = sample_channel(channel_weights(path.throughput), u.y);
+        }
+    }
+    path.t_max = flight_end(path);
+}
+
+// Probability that the flight got as far as it did.
+float survival(Path path) {
+    if (!HAS_MEDIA) {
+        return 1.0;
+    }
+    return HAS_CHROMATIC ? survival_probability(channel_weights(path.throughput), path.tau_rgb) : exp_minus(path.tau);
+}
+
+vec3 survived_throughput(Path path) {
+    if (HAS_MEDIA && HAS_CHROMATIC) {
+        return path.throughput * survival_weight(channel_weights(path.throughput), path.tau_rgb);
+    }
+    return path.throughput;
+}

@@ -1,0 +1,75 @@
+// Where a path scatters: in a medium or on a surface.
+#include "lib/path_state.glsl"
+#include "lib/warp.glsl"
+#include "lib/ray.glsl"
+#include "lib/phase.glsl"
+#include "lib/bsdf.glsl"
+
+// A point where light is scattered, in a medium or on a surface.
+struct Vertex {
+    vec3 point;
+    vec3 axis;      // z of the surface's local frame; in a medium, the direction of propagation
+    bool in_medium;
+    float g;        // of the medium
+    vec3 albedo;    // of the medium, with the weight of the flight
+    Surface surface;
+    vec3 incident;  // on a surface: towards where the path comes from, in the local frame
+};
+
+// Scattering function times cosine, and the density with which directions are sampled.
+BsdfValue eval_scattering(Vertex vertex, vec3 direction) {
+    if (HAS_MEDIA && vertex.in_medium) {
+        float phase = HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(vertex.g, vertex.axis, direction) : INV_4PI;
+        return BsdfValue(vertex.albedo * phase, phase);
+    }
+    return eval_bsdf(vertex.surface, vertex.incident, to_frame(vertex.axis, direction));
+}
+
+BsdfSample sample_scattering(Vertex vertex, vec2 u, float lobe) {
+    if (HAS_MEDIA && vertex.in_medium) {
+        vec3 direction;
+        if (HAS_HENYEY_GREENSTEIN && vertex.g != 0.0) {
+            PhaseAngle angle = sample_henyey_greenstein(vertex.g, u.x);
+            direction = from_frame(vertex.axis, from_polar(angle.cos_theta, angle.sin_theta, u.y));
+        } else {
+            direction = square_to_sphere(u);
+        }
+        return BsdfSample(direction, vertex.albedo, eval_scattering(vertex, direction).pdf, 1.0);
+    }
+    BsdfSample found = sample_bsdf(vertex.surface, vertex.incident, u, lobe);
+    found.direction = from_frame(vertex.axis, found.direction);
+    return found;
+}
+
+// Where a ray in some direction begins so that it does not meet the surface it leaves.
+vec3 offset_origin(Path path, vec3 direction) {
+    return path.point + path.normal * (dot(path.normal, direction) >= 0.0 ? path.offset : -path.offset);
+}
+
+// The medium on the side of a surface to which a direction goes, for a path that came in `medium`.
+uint medium_towards(Vertex vertex, uint medium, vec3 direction) {
+    if (!HAS_DIELECTRIC || vertex.in_medium || (vertex.surface.flags & SURFACE_ORIENTED) == 0u) {
+        return medium;
+    }
+    bool outwards = dot(vertex.axis, direction) > 0.0;
+    if (outwards == (vertex.incident.z > 0.0) || vertex.surface.media == 0u) {
+        return medium;
+    }
+    uint inside = vertex.surface.media & 0xffffu, outside = vertex.surface.media >> 16u;
+    return cross_boundary(medium, outwards ? inside : outside, outwards ? outside : inside);
+}
+
+// A point on a primitive, its unit normal, and the largest coordinate that went into it.
+void surface_point(Primitive primitive, Path path, Hit hit, out vec3 point, out vec3 normal, out float largest) {
+    if (HAS_SPHERES && (primitive.surface & PRIMITIVE_SPHERE) != 0u) {
+        vec3 outwards = normalize(path.origin + path.direction * hit.t - primitive.a);
+        point = primitive.a + outwards * primitive.b.x;
+        normal = outwards * primitive.b.y;
+        largest = max_component(abs(primitive.a)) + primitive.b.x;
+    } else {
+        vec3 edge_1 = primitive.b - primitive.a, edge_2 = primitive.c - primitive.a;
+        point = primitive.a + edge_1 * hit.barycentric.x + edge_2 * hit.barycentric.y;
+        normal = normalize(cross(edge_1, edge_2));
+        largest = max_component(max(abs(primitive.a), max(abs(primitive.b), abs(primitive.c))));
+    }
+}

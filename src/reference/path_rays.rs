@@ -1,0 +1,91 @@
+//! Mirror of `shaders/lib/path_rays.glsl`: what a path's rays take from the primitives they meet.
+
+use super::bindings::Tables;
+use super::path_state::{Hit, INFINITE_DISTANCE, NONE, Path, medium_at};
+use super::ray::{Ray, TriangleHit, intersect_sphere, intersect_triangle};
+use crate::pack::layout::{PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE};
+use glam::{DVec2, DVec3};
+
+/// The length L of a shadow ray in its optical depth σ₀ L + Σ (σ after − σ before) (L − t). Where an infinite ray ends in
+/// vacuum, σ₀ and the steps add up to 0 and any L serves.
+pub fn shadow_length(path: &Path) -> f64 {
+    if path.t_max >= INFINITE_DISTANCE { 0.0 } else { path.t_max }
+}
+
+/// An infinite ray that ends in a medium brings no light.
+pub fn depth_at_infinity(tables: &Tables, path: &Path) -> DVec3 {
+    if path.t_max < INFINITE_DISTANCE {
+        return DVec3::ZERO;
+    }
+    DVec3::select(tables.params.world_sigma_t.cmpgt(DVec3::ZERO), DVec3::splat(INFINITE_DISTANCE), DVec3::ZERO)
+}
+
+/// The state of a traversal before its first step.
+pub fn begin_hit(tables: &Tables, path: &Path) -> Hit {
+    let mut hit = Hit {
+        t: path.t_max,
+        primitive: NONE,
+        along_normal: false,
+        barycentric: DVec2::ZERO,
+        tau_rgb: DVec3::ZERO,
+        blocked: false,
+    };
+    if path.shadow {
+        hit.tau_rgb =
+            medium_at(tables, path.light_medium).sigma_t * shadow_length(path) + depth_at_infinity(tables, path);
+    }
+    hit
+}
+
+/// One crossing of a ray with a primitive.
+pub struct Crossing {
+    t: f64,
+    along_normal: bool,
+    barycentric: DVec2,
+}
+
+/// Takes one crossing with a primitive into account.
+pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit: &mut Hit) {
+    let primitive = tables.primitive(index);
+    let Crossing { t, along_normal, barycentric } = crossing;
+    // Distances first, the primitive's index among equals: surfaces that coincide are met one after the other, none
+    // twice.
+    let begins = t > path.t_min || (t == path.t_min && index > path.last && path.last != NONE);
+    if path.shadow {
+        let boundary = primitive.surface & PRIMITIVE_BOUNDARY != 0;
+        let counts = begins && t < path.t_max;
+        if counts && boundary {
+            let way = (shadow_length(path) - t) * if along_normal { -1.0 } else { 1.0 };
+            hit.tau_rgb += tables.surface_of(primitive).sigma_t_step * way;
+        }
+        // The light itself is not in the way of its light.
+        hit.blocked |= counts && !boundary && primitive.light != path.light + 1;
+    } else if begins && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE)) {
+        hit.t = t;
+        hit.primitive = index;
+        hit.along_normal = along_normal;
+        hit.barycentric = barycentric;
+    }
+}
+
+/// Tests one primitive.
+pub fn test_primitive(tables: &Tables, path: &Path, ray: &Ray, index: u32, hit: &mut Hit) {
+    let primitive = tables.primitive(index);
+    if primitive.surface & PRIMITIVE_SPHERE != 0 {
+        let t = intersect_sphere(ray, primitive.a, primitive.b.x);
+        // A ray that touches the sphere in one point does not cross it.
+        if t.x < t.y {
+            let outwards = primitive.b.y > 0.0;
+            let near = Crossing { t: t.x, along_normal: !outwards, barycentric: DVec2::ZERO };
+            let far = Crossing { t: t.y, along_normal: outwards, barycentric: DVec2::ZERO };
+            record(tables, path, index, near, hit);
+            record(tables, path, index, far, hit);
+        }
+    } else {
+        let found = intersect_triangle(ray, primitive.a, primitive.b, primitive.c);
+        if found.hit {
+            let TriangleHit { t, along_normal, barycentric, .. } = found;
+            record(tables, path, index, Crossing { t, along_normal, barycentric }, hit);
+        }
+    }
+}

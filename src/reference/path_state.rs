@@ -1,0 +1,136 @@
+//! Mirror of `shaders/lib/path_state.glsl`: what a path is between two rays, and its flight through media.
+
+use super::bindings::{Medium, Tables};
+use super::math::minus_log_1m;
+use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
+use super::sampler::{point_index, set_key, shifted_point};
+use crate::pack::layout;
+use crate::pack::sobol::SOBOL_SETS;
+use glam::{DVec2, DVec3, DVec4};
+
+/// Nothing, among indices.
+pub const NONE: u32 = u32::MAX;
+/// Longest distance; rays that end nowhere end here.
+pub const INFINITE_DISTANCE: f64 = layout::INFINITE_DISTANCE as f64;
+
+/// A path between two rays.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Path {
+    /// Of the whole film.
+    pub pixel: u32,
+    /// Of the pixel.
+    pub sample_index: u32,
+    /// Of the ray that is asked for.
+    pub origin: DVec3,
+    /// Of the ray that is asked for; unit.
+    pub direction: DVec3,
+    /// Where the ray begins, or the last boundary on it.
+    pub t_min: f64,
+    /// The free flight, or the distance to the light.
+    pub t_max: f64,
+    /// The boundary at `t_min`, or [`NONE`].
+    pub last: u32,
+    /// A shadow ray is asked for.
+    pub shadow: bool,
+    /// What the radiance at the path's end is multiplied with.
+    pub throughput: DVec3,
+    /// What the path has gathered.
+    pub radiance: DVec3,
+    /// Counts the random numbers' sets.
+    pub segment: u32,
+    /// Scattering events so far.
+    pub depth: u32,
+    /// Density per solid angle of `direction`; 0 for a camera ray.
+    pub pdf: f64,
+    /// The path goes on behind the ray that is asked for.
+    pub alive: bool,
+    /// Where the path is.
+    pub medium: u32,
+    /// Optical depth, in the chosen channel, from `t_min` to the end of the flight.
+    pub tau_left: f64,
+    /// Optical depth from the last event to `t_min`.
+    pub tau_rgb: DVec3,
+    /// The flight's.
+    pub channel: u32,
+    /// Where the far clip plane ends a camera ray.
+    pub far_end: f64,
+    /// Where the path goes on behind a shadow ray.
+    pub next_direction: DVec3,
+    /// What arrives if nothing is in the way.
+    pub light_weight: DVec3,
+    /// Density of the light's direction by scattering over that by light sampling; 0 for a point.
+    pub pdf_ratio: f64,
+    /// The light that the shadow ray goes to.
+    pub light: u32,
+    /// The throughput that scattering towards the light would have.
+    pub light_channels: DVec3,
+    /// The medium in which the shadow ray begins.
+    pub light_medium: u32,
+    /// Of the vertex.
+    pub point: DVec3,
+    /// Of rays that leave a surface, along its normal; 0 in a medium.
+    pub offset: f64,
+    /// Only valid where `offset` is not 0.
+    pub normal: DVec3,
+    /// The medium of the next segment.
+    pub next_medium: u32,
+    /// The product of squared indices that refraction divided radiance by.
+    pub eta_scale: f64,
+}
+
+/// What the traversal found.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Distance.
+    pub t: f64,
+    /// [`NONE`]: nothing within `t_max`.
+    pub primitive: u32,
+    /// The ray goes along the normal.
+    pub along_normal: bool,
+    /// Of a triangle.
+    pub barycentric: DVec2,
+    /// Shadow rays: optical depth.
+    pub tau_rgb: DVec3,
+    /// Shadow rays: something is in the way.
+    pub blocked: bool,
+}
+
+/// The four numbers of a set.
+pub fn sample_set(tables: &Tables, path: &Path, set: u32) -> DVec4 {
+    let key = set_key(tables.params.seed, path.pixel, set, path.sample_index);
+    let point =
+        if set < SOBOL_SETS { tables.points[point_index(set, path.sample_index, key) as usize] } else { [0; 2] };
+    shifted_point(point, key)
+}
+
+/// A medium by its index.
+pub fn medium_at(tables: &Tables, medium: u32) -> &Medium {
+    // An index that boundaries without a consistent nesting made up is vacuum.
+    tables.media.get(medium as usize).unwrap_or(&tables.media[0])
+}
+
+/// Distance to the end of the flight with the extinction that holds from `t_min` on.
+pub fn flight_end(tables: &Tables, path: &Path) -> f64 {
+    let sigma = medium_at(tables, path.medium).sigma_t[path.channel as usize];
+    (path.t_min + free_flight(path.tau_left, sigma)).min(path.far_end)
+}
+
+/// A new segment along `path.direction`: its flight from two random numbers.
+pub fn begin_segment(tables: &Tables, path: &mut Path, u: DVec2) {
+    path.last = NONE;
+    path.shadow = false;
+    path.tau_left = minus_log_1m(u.x);
+    path.tau_rgb = DVec3::ZERO;
+    path.channel = sample_channel(channel_weights(path.throughput), u.y);
+    path.t_max = flight_end(tables, path);
+}
+
+/// Probability that the flight got as far as it did.
+pub fn survival(path: &Path) -> f64 {
+    survival_probability(channel_weights(path.throughput), path.tau_rgb)
+}
+
+/// The throughput with the weight of a flight that got as far as it did.
+pub fn survived_throughput(path: &Path) -> DVec3 {
+    path.throughput * survival_weight(channel_weights(path.throughput), path.tau_rgb)
+}

@@ -1,0 +1,84 @@
+//! Mirror of `shaders/lib/path_vertex.glsl`: where a path scatters, in a medium or on a surface.
+
+use super::bindings::{Primitive, Surface};
+use super::bsdf::{BsdfSample, BsdfValue, eval_bsdf, sample_bsdf};
+use super::math::{from_frame, max_component, to_frame};
+use super::medium::cross_boundary;
+use super::path_state::{Hit, Path};
+use super::phase::{eval_henyey_greenstein, sample_henyey_greenstein};
+use super::warp::from_polar;
+use crate::pack::layout::{PRIMITIVE_SPHERE, SURFACE_ORIENTED};
+use glam::{DVec2, DVec3};
+
+/// A point where light is scattered, in a medium or on a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertex {
+    /// Where it is.
+    pub point: DVec3,
+    /// z of the surface's local frame; in a medium, the direction of propagation.
+    pub axis: DVec3,
+    /// Else on a surface.
+    pub in_medium: bool,
+    /// Of the medium.
+    pub g: f64,
+    /// Of the medium, with the weight of the flight.
+    pub albedo: DVec3,
+    /// What is there, if it is not in a medium.
+    pub surface: Surface,
+    /// On a surface: towards where the path comes from, in the local frame.
+    pub incident: DVec3,
+}
+
+/// Scattering function times cosine, and the density with which directions are sampled.
+pub fn eval_scattering(vertex: &Vertex, direction: DVec3) -> BsdfValue {
+    if vertex.in_medium {
+        let phase = eval_henyey_greenstein(vertex.g, vertex.axis, direction);
+        return BsdfValue { value: vertex.albedo * phase, pdf: phase };
+    }
+    eval_bsdf(&vertex.surface, vertex.incident, to_frame(vertex.axis, direction))
+}
+
+/// A direction found by scattering, in world space.
+pub fn sample_scattering(vertex: &Vertex, u: DVec2, lobe: f64) -> BsdfSample {
+    if vertex.in_medium {
+        let angle = sample_henyey_greenstein(vertex.g, u.x);
+        let local = from_polar(angle.cos_theta, angle.sin_theta, u.y);
+        // For g = 0 no axis matters; the kernel leaves the frame out where it knows no other g.
+        let direction = if vertex.g == 0.0 { local } else { from_frame(vertex.axis, local) };
+        let pdf = eval_scattering(vertex, direction).pdf;
+        return BsdfSample { direction, weight: vertex.albedo, pdf, eta: 1.0 };
+    }
+    let found = sample_bsdf(&vertex.surface, vertex.incident, u, lobe);
+    BsdfSample { direction: from_frame(vertex.axis, found.direction), ..found }
+}
+
+/// Where a ray in some direction begins so that it does not meet the surface it leaves.
+pub fn offset_origin(path: &Path, direction: DVec3) -> DVec3 {
+    path.point + path.normal * if path.normal.dot(direction) >= 0.0 { path.offset } else { -path.offset }
+}
+
+/// The medium on the side of a surface to which a direction goes, for a path that came in `medium`.
+pub fn medium_towards(vertex: &Vertex, medium: u32, direction: DVec3) -> u32 {
+    if vertex.in_medium || vertex.surface.flags & SURFACE_ORIENTED == 0 {
+        return medium;
+    }
+    let outwards = vertex.axis.dot(direction) > 0.0;
+    if outwards == (vertex.incident.z > 0.0) || vertex.surface.media == 0 {
+        return medium;
+    }
+    let (inside, outside) = (vertex.surface.media & 0xffff, vertex.surface.media >> 16);
+    let (from, to) = if outwards { (inside, outside) } else { (outside, inside) };
+    cross_boundary(medium, from, to)
+}
+
+/// A point on a primitive, its unit normal, and the largest coordinate that went into it.
+pub fn surface_point(primitive: &Primitive, path: &Path, hit: &Hit) -> (DVec3, DVec3, f64) {
+    let Primitive { a, b, c, .. } = *primitive;
+    if primitive.surface & PRIMITIVE_SPHERE != 0 {
+        let outwards = (path.origin + path.direction * hit.t - a).normalize();
+        return (a + outwards * b.x, outwards * b.y, max_component(a.abs()) + b.x);
+    }
+    let (edge_1, edge_2) = (b - a, c - a);
+    let point = a + edge_1 * hit.barycentric.x + edge_2 * hit.barycentric.y;
+    (point, edge_1.cross(edge_2).normalize(), max_component(a.abs().max(b.abs().max(c.abs()))))
+}
