@@ -85,11 +85,13 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("bsdf", &["math", "warp"]),
     ("light", &["math", "warp"]),
     ("medium", &["math"]),
-    ("path_state", &["math", "sampler", "medium"]),
+    ("path_state", &["math", "sampler", "medium", "light"]),
+    ("equiangular", &["math"]),
     ("path_vertex", &["path_state", "warp", "ray", "phase", "bsdf"]),
     ("path_lights", &["path_state", "path_vertex", "light"]),
-    ("path_rays", &["path_state", "ray"]),
-    ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "camera"]),
+    ("path_flight", &["path_state", "equiangular", "ray", "light"]),
+    ("path_rays", &["path_state", "path_flight", "ray"]),
+    ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "path_flight", "camera"]),
 ];
 const ALL_MAY_INCLUDE: &[&str] = &["constants", "layout", "features", "sobol"];
 
@@ -148,7 +150,10 @@ fn every_concept_has_a_mirror_and_a_unit_kernel() {
     // The path and its bindings are tested as a whole, by images.
     assert_eq!(
         names("shaders/units", ".comp"),
-        without(concepts, &["path", "path_lights", "path_rays", "path_state", "path_vertex", "bindings"]),
+        without(
+            concepts,
+            &["path", "path_flight", "path_lights", "path_rays", "path_state", "path_vertex", "bindings"]
+        ),
         "unit kernels of concepts"
     );
 }

@@ -31,12 +31,19 @@ float area_pdf(float area, float distance, float cos_light) {
     return distance * distance / (area * cos_light);
 }
 
+// Whether a light is at some place, not infinitely far.
+bool is_local(Light light) {
+    return light.kind != LIGHT_CONSTANT;
+}
+
+// Coordinates along the two edges of a uniform point of a triangle or parallelogram.
+vec2 plane_light_point(Light light, vec2 u) {
+    float s = sqrt(u.x);
+    return light.kind == LIGHT_TRIANGLE ? vec2(1.0 - s, u.y * s) : u;
+}
+
 LightSample sample_plane_light(Light light, vec3 point, vec2 u) {
-    vec2 v = u;
-    if (light.kind == LIGHT_TRIANGLE) {
-        float s = sqrt(u.x);
-        v = vec2(1.0 - s, u.y * s);
-    }
+    vec2 v = plane_light_point(light, u);
     vec3 offset = light.origin + light.edge_1 * v.x + light.edge_2 * v.y - point;
     float squared = dot(offset, offset);
     LightSample result;

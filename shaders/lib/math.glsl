@@ -15,6 +15,12 @@ float minus_log_1m(float u) {
     return -(float(exponent) * 0.69314718 + log_m);
 }
 
+// -log(1 - x) for any x in [0, 1 - 2^-24], also where 1 - x has lost digits of x: there Taylor's polynomial.
+float minus_log_1m_small(float x) {
+    float series = x * (1.0 + x * (0.5 + x * (0.33333334 + x * (0.25 + x * 0.2))));
+    return x < 0.03 ? series : minus_log_1m(x);
+}
+
 // exp(-x) for x >= 0 with a relative error below 2e-7 down to the smallest normal number; 0 beyond, and for infinite x.
 // Range reduction by Cody and Waite (1980), then Taylor's polynomial on [-log(2)/2, log(2)/2].
 float exp_minus(float x) {
@@ -27,6 +33,30 @@ float exp_minus(float x) {
 
 vec3 exp_minus(vec3 x) {
     return vec3(exp_minus(x.x), exp_minus(x.y), exp_minus(x.z));
+}
+
+// 1 - exp(-x) for x >= 0, with a relative error below 3e-7: Taylor's polynomial where the difference would cancel.
+float one_minus_exp_minus(float x) {
+    float series = x * (1.0 - x * (0.5 - x * (0.16666667 - x * (0.041666668 - x * (0.0083333338 - x * 0.0013888889)))));
+    return x < 0.5 ? series : 1.0 - exp_minus(x);
+}
+
+vec3 one_minus_exp_minus(vec3 x) {
+    return vec3(one_minus_exp_minus(x.x), one_minus_exp_minus(x.y), one_minus_exp_minus(x.z));
+}
+
+// The angle of (x, y) for y >= 0, in [0, pi], with a relative error below 3e-7; pi / 2 for (0, 0). Drivers' atan() is good to some
+// four digits. On [0, 1] the argument is moved to |t| <= tan(pi/8), where Moshier's polynomial (Cephes library, 1989) holds.
+float arctangent(float y, float x) {
+    float a = abs(x);
+    float ratio = min(y, a) / max(max(y, a), 1e-37);
+    bool upper = ratio > 0.41421356;
+    float t = upper ? (ratio - 1.0) / (ratio + 1.0) : ratio;
+    float z = t * t;
+    float angle = t + t * z * (-0.333329491539 + z * (0.199777106478 + z * (-0.138776856032 + z * 0.0805374449538)));
+    angle += upper ? 0.78539816 : 0.0;
+    angle = y > a || a == 0.0 ? 1.57079633 - angle : angle;
+    return x < 0.0 ? PI - angle : angle;
 }
 
 // Two unit vectors that make up a right-handed frame with the unit vector n: tangent x bitangent = n (Duff et al. 2017).

@@ -3,6 +3,7 @@
 // A flight is sampled with the extinction of one channel, chosen with probabilities w, and weighted with the density of the
 // mixture (one-sample MIS over the channels; Wilkie et al. 2014, Miller et al. 2019). In a gray medium this reduces to weights
 // of albedo and 1.
+#include "lib/constants.glsl"
 #include "lib/math.glsl"
 
 // Probabilities to choose each channel: proportional to the throughput.
@@ -43,9 +44,24 @@ vec3 scatter_weight(vec3 weights, vec3 tau, vec3 sigma_t, vec3 albedo) {
     return albedo * collision / dot(weights, collision);
 }
 
-// The medium behind a boundary that is crossed from `from` to `to`. Boundaries that coincide may be met in either order;
-// the indices add up to the right one once all are crossed. A medium that the boundary does not expect in front of it, but
-// behind it, stays: the vertex lay on the other side by rounding.
-uint cross_boundary(uint medium, uint from, uint to) {
-    return medium == from || medium == to ? to : medium + to - from;
+// Which medium lies behind boundaries is a sum: each crossing adds the code of the medium it leads to and takes away that of
+// the medium it leads from, so boundaries that coincide may be met in any order. On the way the sum may stand for no medium.
+// Codes are scattered numbers, so that no such sum is that of a medium by chance.
+uint medium_code(uint medium) {
+    uint code = (medium + 1u) * 0x9e3779b9u;
+    code = (code ^ code >> 16u) * 0x85ebca6bu;
+    return code ^ code >> 13u;
+}
+
+// The medium whose code is `sum`, first asked if it is `guess`; NONE if there is none.
+uint medium_of_code(uint sum, uint guess, uint medium_count) {
+    if (sum == medium_code(guess)) {
+        return guess;
+    }
+    [[dont_unroll]] for (uint medium = 0u; medium < medium_count; ++medium) {
+        if (sum == medium_code(medium)) {
+            return medium;
+        }
+    }
+    return NONE;
 }

@@ -15,6 +15,7 @@
 #include "lib/path_vertex.glsl"
 #include "lib/path_lights.glsl"
 #include "lib/path_rays.glsl"
+#include "lib/path_flight.glsl"
 #include "lib/camera.glsl"
 
 // Depth at which roulette begins to end paths that lose nothing, so that a closed scene without absorption ends.
@@ -89,45 +90,46 @@ void next_segment(inout Path path) {
 
 // Answers a ray that extends the path.
 void path_advance(inout Path path, Hit hit) {
-    bool surface_hit = hit.primitive != NONE;
+    bool surface_hit = hit.primitive != NONE && hit.t < path.t_max;
     float t = surface_hit ? hit.t : path.t_max;
 
-    // The optical depth of the way through the medium since t_min.
     Medium medium;
+    FlightEnd end = FlightEnd(false, t, vec3(0.0));
     if (HAS_MEDIA) {
         medium = MEDIUM(valid_medium(path.medium));
-        float way = t - path.t_min;
-        path.tau_left -= way * (HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
-        if (HAS_CHROMATIC) {
-            path.tau_rgb += medium.sigma_t * way;
-        } else {
-            path.tau += medium.sigma_t.x * way;
-        }
+        end = end_flight(path, medium, t, surface_hit);
     }
-    if (!surface_hit && t >= path.far_end) {
-        add_constant_light(path);
-        path.alive = false;
-        path.shadow = false;
-        return;
-    }
-    if (!surface_hit) {
-        vec3 weight = medium.albedo;
-        if (HAS_CHROMATIC) {
-            weight = scatter_weight(channel_weights(path.throughput), path.tau_rgb, medium.sigma_t, medium.albedo);
-        }
-        vec3 point = path.origin + path.direction * t;
+    if (end.scatters) {
         path.offset = 0.0;
         path.normal = path.direction;
         Surface none;
-        scatter(path, Vertex(point, path.direction, true, medium.g, weight, none, vec3(0.0)));
+        scatter(path, Vertex(flight_point(path, hit, end.t), path.direction, true, medium.g, end.weight, none, vec3(0.0)));
     } else {
+        if (HAS_MEDIA) {
+            // The optical depth of the way through the medium since t_min.
+            float way = t - path.t_min;
+            path.tau_left -= way * (HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
+            if (HAS_CHROMATIC) {
+                path.tau_rgb += medium.sigma_t * way;
+            } else {
+                path.tau += medium.sigma_t.x * way;
+            }
+        }
+        if (!surface_hit) {
+            add_constant_light(path);
+            path.alive = false;
+            path.shadow = false;
+            return;
+        }
         Primitive primitive = PRIMITIVE(hit.primitive);
         Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
         if (HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u) {
             uint inside = surface.media & 0xffffu, outside = surface.media >> 16u;
-            path.medium = cross_boundary(path.medium, hit.along_normal ? inside : outside, hit.along_normal ? outside : inside);
+            bool again = t == path.t_min && path.last != NONE;
+            enter_medium(path, hit.along_normal ? inside : outside, hit.along_normal ? outside : inside, again);
             path.t_min = t;
             path.last = hit.primitive;
+            path.last_along_normal = hit.along_normal;
             path.tau_left = max(path.tau_left, 0.0);
             path.t_max = flight_end(path);
             return;

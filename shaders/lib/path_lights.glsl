@@ -49,12 +49,7 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u, float lobe) {
     if (!HAS_LIGHT_SAMPLING) {
         return false;
     }
-    uint index = 0u;
-    if (HAS_MANY_LIGHTS) {
-        index = alias_line(params.light_count, u.x);
-        Light line = LIGHT(index);
-        index = alias_keeps(line.alias_threshold, u.x) ? index : line.alias;
-    }
+    uint index = choose_light(u.x);
     Light light = LIGHT(index);
     LightSample found;
     if (HAS_CONSTANT_LIGHT && light.kind == LIGHT_CONSTANT) {

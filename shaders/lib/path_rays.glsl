@@ -1,5 +1,6 @@
 // What a path's rays take from the primitives they meet: the nearest one, or, for shadow rays, everything in any order.
 #include "lib/path_state.glsl"
+#include "lib/path_flight.glsl"
 #include "lib/ray.glsl"
 
 // The length L of a shadow ray in its optical depth sigma_0 L + sum (sigma_to - sigma_from) (L - t_i), in which the order of the
@@ -15,7 +16,9 @@ vec3 depth_at_infinity(Path path) {
 
 // The state of a traversal before its first step.
 Hit begin_hit(Path path) {
-    Hit hit = Hit(path.t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false);
+    // Extension rays see a little beyond their flight: see flight_point().
+    float t_max = HAS_MEDIA && !path.shadow ? path.t_max + near_distance(path, path.t_max) : path.t_max;
+    Hit hit = Hit(t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false);
     if (HAS_MEDIA && HAS_LIGHT_SAMPLING && path.shadow) {
         uint medium = HAS_DIELECTRIC ? path.light_medium : path.medium;
         vec3 tau = MEDIUM(valid_medium(medium)).sigma_t * shadow_length(path) + depth_at_infinity(path);

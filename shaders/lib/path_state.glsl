@@ -2,6 +2,10 @@
 #include "lib/math.glsl"
 #include "lib/sampler.glsl"
 #include "lib/medium.glsl"
+#include "lib/light.glsl"
+
+// More than minus_log_1m ever gives: no flight is longer.
+const float MAX_FLIGHT_TAU = 16.7;
 
 struct Path {
     uint pixel;             // of the whole film
@@ -10,8 +14,9 @@ struct Path {
     vec3 origin;
     vec3 direction;
     float t_min;            // where the ray begins, or the last boundary on it
-    float t_max;            // the free flight, or the distance to the light
+    float t_max;            // how far the free flight may get, or the distance to the light
     uint last;              // the boundary at t_min, or NONE
+    bool last_along_normal; // the ray went along its normal; only valid if last is not NONE
     bool shadow;
     // The path.
     vec3 throughput;
@@ -21,7 +26,8 @@ struct Path {
     float pdf;              // density per solid angle of `direction`; 0 for a camera ray
     bool alive;
     // The medium and the flight through it. Scalars serve gray media, vectors chromatic ones.
-    uint medium;
+    uint medium;            // NONE where boundaries that contradict each other leave none
+    uint medium_sum;        // of the codes of media, over the crossings at t_min
     float tau_left;         // optical depth, in the chosen channel, from t_min to the end of the flight
     float tau;              // optical depth from the last event to t_min
     vec3 tau_rgb;
@@ -76,9 +82,14 @@ float flight_end(Path path) {
     if (!HAS_MEDIA) {
         return path.far_end;
     }
-    vec3 sigma_t = MEDIUM(valid_medium(path.medium)).sigma_t;
+    Medium medium = MEDIUM(valid_medium(path.medium));
+    vec3 sigma_t = medium.sigma_t;
     float sigma = HAS_CHROMATIC ? channel_of(sigma_t, path.channel) : sigma_t.x;
-    return min(path.t_min + free_flight(path.tau_left, sigma), path.far_end);
+    float flight = free_flight(path.tau_left, sigma);
+    if (HAS_EQUIANGULAR && medium.equiangular > 0.0) {
+        flight = free_flight(MAX_FLIGHT_TAU, medium.least_sigma_t);
+    }
+    return min(path.t_min + flight, path.far_end);
 }
 
 // A new segment along path.direction: its flight from two random numbers.
@@ -109,4 +120,14 @@ vec3 survived_throughput(Path path) {
         return path.throughput * survival_weight(channel_weights(path.throughput), path.tau_rgb);
     }
     return path.throughput;
+}
+
+// Chooses a light by the alias table; what is left of u is uniform again.
+uint choose_light(inout float u) {
+    if (!HAS_MANY_LIGHTS) {
+        return 0u;
+    }
+    uint index = alias_line(params.light_count, u);
+    Light line = LIGHT(index);
+    return alias_keeps(line.alias_threshold, u) ? index : line.alias;
 }

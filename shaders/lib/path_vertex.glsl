@@ -56,7 +56,10 @@ uint medium_towards(Vertex vertex, uint medium, vec3 direction) {
         return medium;
     }
     uint inside = vertex.surface.media & 0xffffu, outside = vertex.surface.media >> 16u;
-    return cross_boundary(medium, outwards ? inside : outside, outwards ? outside : inside);
+    uint from = outwards ? inside : outside, to = outwards ? outside : inside;
+    // If the surface does not expect the medium in front of it, it coincides with another boundary.
+    uint found = medium == from ? to : medium_of_code(medium_code(medium) + medium_code(to) - medium_code(from), to, params.medium_count);
+    return found == NONE ? to : found;
 }
 
 // A point on a primitive, its unit normal, and the largest coordinate that went into it.

@@ -13,6 +13,8 @@ pub struct Features {
     pub chromatic: bool,
     /// A phase function with g ≠ 0.
     pub henyey_greenstein: bool,
+    /// A medium in which distances are also sampled by the angle under which a light sees them.
+    pub equiangular: bool,
     /// A surface that rays cross without an event.
     pub boundaries: bool,
     /// Spheres among the primitives.
@@ -58,10 +60,13 @@ impl Features {
         let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
         let area_lights = kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD) || kind(LIGHT_SPHERE);
         let max_depth = max_depth.unwrap_or(u32::MAX);
+        // Where the only light is the surroundings and nothing absorbs on the way, scattered rays find it just as well.
+        let light_sampling = max_depth > 1 && (area_lights || kind(LIGHT_POINT) || (kind(LIGHT_CONSTANT) && media));
         Features {
             media,
             chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x)),
             henyey_greenstein: packed.media.iter().any(|medium| medium.g != 0.0),
+            equiangular: packed.media.iter().any(|medium| medium.equiangular > 0.0),
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
             spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
             area_lights,
@@ -78,8 +83,7 @@ impl Features {
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
             },
             hide_emitters,
-            // Where the only light is the surroundings and nothing absorbs on the way, scattered rays find it just as well.
-            light_sampling: max_depth > 1 && (area_lights || kind(LIGHT_POINT) || (kind(LIGHT_CONSTANT) && media)),
+            light_sampling,
             max_depth,
             rr_depth,
             node_copies: packed.bvh.copies,
@@ -92,6 +96,7 @@ impl Features {
             media: true,
             chromatic: true,
             henyey_greenstein: true,
+            equiangular: true,
             boundaries: true,
             spheres: true,
             area_lights: true,
@@ -114,6 +119,7 @@ impl Features {
             ("HAS_MEDIA", self.media),
             ("HAS_CHROMATIC", self.chromatic),
             ("HAS_HENYEY_GREENSTEIN", self.henyey_greenstein),
+            ("HAS_EQUIANGULAR", self.equiangular),
             ("HAS_BOUNDARIES", self.boundaries),
             ("HAS_SPHERES", self.spheres),
             ("HAS_AREA_LIGHTS", self.area_lights),

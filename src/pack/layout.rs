@@ -158,6 +158,14 @@ gpu_struct! {
         emission: Vec3,
         /// Index of the light that stands for the medium's emission, plus one; 0 if it does not emit or is not sampled.
         light: u32,
+        /// Smallest of the channels of `sigma_t`.
+        least_sigma_t: f32,
+        /// Share of equiangular sampling among the distances at which light scatters; 0: free flights alone.
+        equiangular: f32,
+        /// Fills the sixteen bytes.
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
     }
 }
 

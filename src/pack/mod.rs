@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
 pub mod features;
+mod flight;
 pub mod frame;
 pub mod layout;
 pub mod lights;
@@ -92,7 +93,7 @@ impl Packed {
         if scene.media.len() > MAX_MEDIA {
             return Err(PackError::TooManyMedia(scene.media.len()));
         }
-        let media = pack_media(scene, &frame)?;
+        let mut media = pack_media(scene, &frame)?;
         let mut surfaces = Vec::with_capacity(scene.shapes.len());
         let mut primitives = Vec::new();
         let mut lights = LightTable::default();
@@ -109,6 +110,7 @@ impl Packed {
         }
         let (bvh, primitives) = Bvh::new(&primitives);
         let lights = lights.finish();
+        flight::choose_equiangular(scene, &nesting, &frame, &lights, &mut media);
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
         params = Params {
             seed,
@@ -154,6 +156,7 @@ const EMPTY_FEATURES: Features = Features {
     media: false,
     chromatic: false,
     henyey_greenstein: false,
+    equiangular: false,
     boundaries: false,
     spheres: false,
     area_lights: false,
@@ -191,7 +194,8 @@ fn pack_media(scene: &Scene, frame: &Frame) -> Result<Vec<Medium>, PackError> {
             // `support` has refused all others.
             _ => 0.0,
         };
-        media.push(Medium { sigma_t, g, albedo: medium.albedo.as_vec3(), ..Medium::default() });
+        let least_sigma_t = sigma_t.min_element();
+        media.push(Medium { sigma_t, g, albedo: medium.albedo.as_vec3(), least_sigma_t, ..Medium::default() });
     }
     Ok(media)
 }

@@ -74,6 +74,8 @@ pub struct Medium {
     pub phase: u32,
     pub emission: DVec3,
     pub light: u32,
+    pub least_sigma_t: f64,
+    pub equiangular: f64,
 }
 
 /// See [`layout::Light`].
@@ -190,6 +192,8 @@ impl From<&layout::Medium> for Medium {
             phase: from.phase,
             emission: from.emission.as_dvec3(),
             light: from.light,
+            least_sigma_t: f64::from(from.least_sigma_t),
+            equiangular: f64::from(from.equiangular),
         }
     }
 }

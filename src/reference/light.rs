@@ -3,7 +3,7 @@
 use super::bindings::Light;
 use super::math::from_frame;
 use super::warp::{square_to_cone, square_to_cone_pdf, square_to_sphere, square_to_sphere_pdf};
-use crate::pack::layout::LIGHT_TRIANGLE;
+use crate::pack::layout::{LIGHT_CONSTANT, LIGHT_TRIANGLE};
 use glam::{DVec2, DVec3};
 
 /// The largest number below 1 that the kernel knows.
@@ -47,13 +47,20 @@ pub fn area_pdf(area: f64, distance: f64, cos_light: f64) -> f64 {
     distance * distance / (area * cos_light)
 }
 
+/// Whether a light is at some place, not infinitely far.
+pub fn is_local(light: &Light) -> bool {
+    light.kind != LIGHT_CONSTANT
+}
+
+/// Coordinates along the two edges of a uniform point of a triangle or parallelogram.
+pub fn plane_light_point(light: &Light, u: DVec2) -> DVec2 {
+    let s = u.x.sqrt();
+    if light.kind == LIGHT_TRIANGLE { DVec2::new(1.0 - s, u.y * s) } else { u }
+}
+
 /// A point on a triangle or parallelogram.
 pub fn sample_plane_light(light: &Light, point: DVec3, u: DVec2) -> LightSample {
-    let mut v = u;
-    if light.kind == LIGHT_TRIANGLE {
-        let s = u.x.sqrt();
-        v = DVec2::new(1.0 - s, u.y * s);
-    }
+    let v = plane_light_point(light, u);
     let offset = light.origin + light.edge_1 * v.x + light.edge_2 * v.y - point;
     let squared = offset.dot(offset);
     let distance = squared.sqrt();

@@ -45,7 +45,17 @@ pub fn scatter_weight(weights: DVec3, tau: DVec3, sigma_t: DVec3, albedo: DVec3)
     albedo * collision / weights.dot(collision)
 }
 
-/// The medium behind a boundary that is crossed from `from` to `to`.
-pub fn cross_boundary(medium: u32, from: u32, to: u32) -> u32 {
-    if medium == from || medium == to { to } else { medium.wrapping_add(to).wrapping_sub(from) }
+/// A number for each medium, such that sums and differences of a few are not that of another by chance.
+pub fn medium_code(medium: u32) -> u32 {
+    let code = medium.wrapping_add(1).wrapping_mul(0x9e37_79b9);
+    let code = (code ^ code >> 16).wrapping_mul(0x85eb_ca6b);
+    code ^ code >> 13
+}
+
+/// The medium whose code is `sum`; `u32::MAX` if there is none.
+pub fn medium_of_code(sum: u32, guess: u32, medium_count: u32) -> u32 {
+    if sum == medium_code(guess) {
+        return guess;
+    }
+    (0..medium_count).find(|medium| sum == medium_code(*medium)).unwrap_or(u32::MAX)
 }

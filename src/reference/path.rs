@@ -5,7 +5,8 @@ use super::bindings::{Surface, Tables};
 use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
 use super::math::{exp_minus_rgb, max_component, to_frame};
-use super::medium::{channel_weights, cross_boundary, scatter_weight};
+use super::medium::channel_weights;
+use super::path_flight::{end_flight, enter_medium, flight_point};
 use super::path_lights::{add_constant_light, add_emission, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
@@ -59,7 +60,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     path.shadow =
         (vertex.in_medium || bsdf_has_density(&vertex.surface)) && sample_light(tables, path, vertex, u.xy(), u.z);
     path.next_direction = next.direction;
-    path.next_medium = medium_towards(vertex, path.medium, next.direction);
+    path.next_medium = medium_towards(tables, vertex, path.medium, next.direction);
     path.throughput *= next.weight;
     path.pdf = next.pdf;
     path.eta_scale *= next.eta * next.eta;
@@ -90,38 +91,39 @@ fn next_segment(tables: &Tables, path: &mut Path) {
 
 /// Answers a ray that extends the path.
 pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
-    let surface_hit = hit.primitive != NONE;
+    let surface_hit = hit.primitive != NONE && hit.t < path.t_max;
     let t = if surface_hit { hit.t } else { path.t_max };
 
-    // The optical depth of the way through the medium since `t_min`.
     let medium = *medium_at(tables, path.medium);
-    let way = t - path.t_min;
-    path.tau_left -= way * medium.sigma_t[path.channel as usize];
-    path.tau_rgb += medium.sigma_t * way;
-    if !surface_hit && t >= path.far_end {
-        add_constant_light(tables, path);
-        path.alive = false;
-        path.shadow = false;
-        return;
-    }
-    if !surface_hit {
-        let weight = scatter_weight(channel_weights(path.throughput), path.tau_rgb, medium.sigma_t, medium.albedo);
-        let point = path.origin + path.direction * t;
+    let end = end_flight(tables, path, &medium, t, surface_hit);
+    if end.scatters {
+        let point = flight_point(tables, path, hit, end.t);
         path.offset = 0.0;
         path.normal = path.direction;
-        let (surface, incident) = (Surface::default(), DVec3::ZERO);
-        let vertex =
-            Vertex { point, axis: path.direction, in_medium: true, g: medium.g, albedo: weight, surface, incident };
+        let (axis, surface, incident) = (path.direction, Surface::default(), DVec3::ZERO);
+        let vertex = Vertex { point, axis, in_medium: true, g: medium.g, albedo: end.weight, surface, incident };
         scatter(tables, path, &vertex);
     } else {
+        // The optical depth of the way through the medium since `t_min`.
+        let way = t - path.t_min;
+        path.tau_left -= way * medium.sigma_t[path.channel as usize];
+        path.tau_rgb += medium.sigma_t * way;
+        if !surface_hit {
+            add_constant_light(tables, path);
+            path.alive = false;
+            path.shadow = false;
+            return;
+        }
         let primitive = tables.primitive(hit.primitive);
         let surface = tables.surface_of(primitive);
         if primitive.surface & PRIMITIVE_BOUNDARY != 0 {
             let (inside, outside) = (surface.media & 0xffff, surface.media >> 16);
             let (from, to) = if hit.along_normal { (inside, outside) } else { (outside, inside) };
-            path.medium = cross_boundary(path.medium, from, to);
+            let again = t == path.t_min && path.last != NONE;
+            enter_medium(tables, path, from, to, again);
             path.t_min = t;
             path.last = hit.primitive;
+            path.last_along_normal = hit.along_normal;
             path.tau_left = path.tau_left.max(0.0);
             path.t_max = flight_end(tables, path);
             return;

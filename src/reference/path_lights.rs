@@ -3,11 +3,10 @@
 use super::bindings::{Light, Primitive, Tables};
 use super::bsdf::BsdfSample;
 use super::light::{
-    LightSample, alias_keeps, alias_line, area_pdf, sample_plane_light, sample_point_light, sample_sphere_light,
-    sphere_light_pdf,
+    LightSample, area_pdf, sample_plane_light, sample_point_light, sample_sphere_light, sphere_light_pdf,
 };
 use super::math::max_component;
-use super::path_state::{INFINITE_DISTANCE, Path, survival, survived_throughput};
+use super::path_state::{INFINITE_DISTANCE, Path, choose_light, survival, survived_throughput};
 use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
 use crate::pack::layout::{LIGHT_CONSTANT, LIGHT_POINT, LIGHT_SPHERE};
 use glam::{DVec2, DVec3};
@@ -59,9 +58,7 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
     if !tables.features.light_sampling {
         return false;
     }
-    let mut index = alias_line(tables.lights.len() as u32, &mut u.x);
-    let line = &tables.lights[index as usize];
-    index = if alias_keeps(line.alias_threshold, &mut u.x) { index } else { line.alias };
+    let index = choose_light(tables, &mut u.x);
     let light = &tables.lights[index as usize];
     let found = match light.kind {
         LIGHT_CONSTANT => {
@@ -82,7 +79,7 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
     path.light_channels = path.throughput * scattering.value;
     path.light_weight = path.light_channels * found.weight / light.probability;
     path.pdf_ratio = if found.pdf > 0.0 { scattering.pdf / (found.pdf * light.probability) } else { 0.0 };
-    path.light_medium = medium_towards(vertex, path.medium, found.direction);
+    path.light_medium = medium_towards(tables, vertex, path.medium, found.direction);
     path.origin = offset_origin(path, found.direction);
     max_component(path.light_weight) > 0.0 || !path.light_weight.is_finite()
 }

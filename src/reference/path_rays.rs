@@ -1,6 +1,7 @@
 //! Mirror of `shaders/lib/path_rays.glsl`: what a path's rays take from the primitives they meet.
 
 use super::bindings::Tables;
+use super::path_flight::near_distance;
 use super::path_state::{Hit, INFINITE_DISTANCE, NONE, Path, medium_at};
 use super::ray::{Ray, TriangleHit, intersect_sphere, intersect_triangle};
 use crate::pack::layout::{PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE};
@@ -22,14 +23,10 @@ pub fn depth_at_infinity(tables: &Tables, path: &Path) -> DVec3 {
 
 /// The state of a traversal before its first step.
 pub fn begin_hit(tables: &Tables, path: &Path) -> Hit {
-    let mut hit = Hit {
-        t: path.t_max,
-        primitive: NONE,
-        along_normal: false,
-        barycentric: DVec2::ZERO,
-        tau_rgb: DVec3::ZERO,
-        blocked: false,
-    };
+    // Extension rays see a little beyond their flight: see `flight_point`.
+    let t = if path.shadow { path.t_max } else { path.t_max + near_distance(path, path.t_max) };
+    let mut hit =
+        Hit { t, primitive: NONE, along_normal: false, barycentric: DVec2::ZERO, tau_rgb: DVec3::ZERO, blocked: false };
     if path.shadow {
         hit.tau_rgb =
             medium_at(tables, path.light_medium).sigma_t * shadow_length(path) + depth_at_infinity(tables, path);

@@ -1,6 +1,7 @@
 //! Mirror of `shaders/lib/path_state.glsl`: what a path is between two rays, and its flight through media.
 
 use super::bindings::{Medium, Tables};
+use super::light::{alias_keeps, alias_line};
 use super::math::minus_log_1m;
 use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
 use super::sampler::{point_index, set_key, shifted_point};
@@ -12,6 +13,8 @@ use glam::{DVec2, DVec3, DVec4};
 pub const NONE: u32 = u32::MAX;
 /// Longest distance; rays that end nowhere end here.
 pub const INFINITE_DISTANCE: f64 = layout::INFINITE_DISTANCE as f64;
+/// More than the optical depth that any free flight gets.
+const MAX_FLIGHT_TAU: f64 = 16.7;
 
 /// A path between two rays.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,6 +33,8 @@ pub struct Path {
     pub t_max: f64,
     /// The boundary at `t_min`, or [`NONE`].
     pub last: u32,
+    /// The ray went along the normal of `last`.
+    pub last_along_normal: bool,
     /// A shadow ray is asked for.
     pub shadow: bool,
     /// What the radiance at the path's end is multiplied with.
@@ -44,8 +49,10 @@ pub struct Path {
     pub pdf: f64,
     /// The path goes on behind the ray that is asked for.
     pub alive: bool,
-    /// Where the path is.
+    /// Where the path is; [`NONE`] where boundaries that contradict each other leave no medium.
     pub medium: u32,
+    /// Sum of the codes of media over the crossings at `t_min`.
+    pub medium_sum: u32,
     /// Optical depth, in the chosen channel, from `t_min` to the end of the flight.
     pub tau_left: f64,
     /// Optical depth from the last event to `t_min`.
@@ -111,8 +118,13 @@ pub fn medium_at(tables: &Tables, medium: u32) -> &Medium {
 
 /// Distance to the end of the flight with the extinction that holds from `t_min` on.
 pub fn flight_end(tables: &Tables, path: &Path) -> f64 {
-    let sigma = medium_at(tables, path.medium).sigma_t[path.channel as usize];
-    (path.t_min + free_flight(path.tau_left, sigma)).min(path.far_end)
+    let medium = medium_at(tables, path.medium);
+    let flight = if medium.equiangular > 0.0 {
+        free_flight(MAX_FLIGHT_TAU, medium.least_sigma_t)
+    } else {
+        free_flight(path.tau_left, medium.sigma_t[path.channel as usize])
+    };
+    (path.t_min + flight).min(path.far_end)
 }
 
 /// A new segment along `path.direction`: its flight from two random numbers.
@@ -133,4 +145,11 @@ pub fn survival(path: &Path) -> f64 {
 /// The throughput with the weight of a flight that got as far as it did.
 pub fn survived_throughput(path: &Path) -> DVec3 {
     path.throughput * survival_weight(channel_weights(path.throughput), path.tau_rgb)
+}
+
+/// Chooses a light by the alias table; what is left of u is uniform again.
+pub fn choose_light(tables: &Tables, u: &mut f64) -> u32 {
+    let index = alias_line(tables.lights.len() as u32, u);
+    let line = &tables.lights[index as usize];
+    if alias_keeps(line.alias_threshold, u) { index } else { line.alias }
 }

@@ -1,10 +1,10 @@
 //! Mirror of `shaders/lib/path_vertex.glsl`: where a path scatters, in a medium or on a surface.
 
-use super::bindings::{Primitive, Surface};
+use super::bindings::{Primitive, Surface, Tables};
 use super::bsdf::{BsdfSample, BsdfValue, eval_bsdf, sample_bsdf};
 use super::math::{from_frame, max_component, to_frame};
-use super::medium::cross_boundary;
-use super::path_state::{Hit, Path};
+use super::medium::{medium_code, medium_of_code};
+use super::path_state::{Hit, NONE, Path};
 use super::phase::{eval_henyey_greenstein, sample_henyey_greenstein};
 use super::warp::from_polar;
 use crate::pack::layout::{PRIMITIVE_SPHERE, SURFACE_ORIENTED};
@@ -58,7 +58,7 @@ pub fn offset_origin(path: &Path, direction: DVec3) -> DVec3 {
 }
 
 /// The medium on the side of a surface to which a direction goes, for a path that came in `medium`.
-pub fn medium_towards(vertex: &Vertex, medium: u32, direction: DVec3) -> u32 {
+pub fn medium_towards(tables: &Tables, vertex: &Vertex, medium: u32, direction: DVec3) -> u32 {
     if vertex.in_medium || vertex.surface.flags & SURFACE_ORIENTED == 0 {
         return medium;
     }
@@ -68,7 +68,10 @@ pub fn medium_towards(vertex: &Vertex, medium: u32, direction: DVec3) -> u32 {
     }
     let (inside, outside) = (vertex.surface.media & 0xffff, vertex.surface.media >> 16);
     let (from, to) = if outwards { (inside, outside) } else { (outside, inside) };
-    cross_boundary(medium, from, to)
+    // If the surface does not expect the medium in front of it, it coincides with another boundary.
+    let sum = medium_code(medium).wrapping_add(medium_code(to)).wrapping_sub(medium_code(from));
+    let found = if medium == from { to } else { medium_of_code(sum, to, tables.media.len() as u32) };
+    if found == NONE { to } else { found }
 }
 
 /// A point on a primitive, its unit normal, and the largest coordinate that went into it.

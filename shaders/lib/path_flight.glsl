@@ -1,0 +1,115 @@
+// Where a flight through a medium ends: at a surface, or at a point where it scatters.
+#include "lib/path_state.glsl"
+#include "lib/equiangular.glsl"
+#include "lib/light.glsl"
+#include "lib/ray.glsl"
+
+// Sets of random numbers that choose what a segment's equiangular sampling goes by.
+const uint PIVOT_SET = 0x40000000u;
+
+struct FlightEnd {
+    bool scatters;
+    float t;
+    vec3 weight;    // of a path that scatters: albedo, transmittance and density of t together
+};
+
+// A point of the light, chosen with two random numbers, if the light is somewhere.
+bool light_pivot(Light light, vec2 u, out vec3 pivot) {
+    pivot = light.origin;
+    if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_QUAD) {
+        vec2 v = plane_light_point(light, u);
+        pivot += light.edge_1 * v.x + light.edge_2 * v.y;
+    }
+    return is_local(light);
+}
+
+// Where the flight ends on a ray that meets a surface at t_end, or nothing before t_end. A flight in a medium with equiangular
+// sampling is traced as far as it may get at all; whether it scatters on the way is decided by its free flight, and where, by
+// one of two techniques: the free flight itself, or with the probability `equiangular` distances that are likely near a light.
+// The weight has the density of both (one-sample MIS).
+FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
+    FlightEnd end = FlightEnd(!surface && t_end < path.far_end, t_end, medium.albedo);
+    float sigma = HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x;
+    float way = t_end - path.t_min;
+    bool mixed = HAS_EQUIANGULAR && medium.equiangular > 0.0;
+    if (mixed) {
+        end.scatters = path.tau_left < sigma * way;
+    }
+    if (!end.scatters) {
+        return end;
+    }
+    vec3 weights = HAS_CHROMATIC ? channel_weights(path.throughput) : vec3(0.0);
+    if (!mixed) {
+        if (HAS_CHROMATIC) {
+            end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * way, medium.sigma_t, medium.albedo);
+        }
+        return end;
+    }
+    float scatters = one_minus_exp_minus(sigma * way);
+    float u = min(one_minus_exp_minus(path.tau_left) / scatters, 0.99999994);
+    vec4 v = sample_set(path, PIVOT_SET + path.segment);
+    Light light = LIGHT(choose_light(v.x));
+    vec3 pivot;
+    float share = light_pivot(light, v.zw, pivot) ? medium.equiangular : 0.0;
+    Stretch stretch = stretch_seen_from(pivot, path.origin, path.direction, path.t_min, t_end);
+    float s;
+    if (u < share) {
+        s = sample_equiangular(stretch, u / share);
+    } else {
+        s = min(free_flight(minus_log_1m_small((u - share) / (1.0 - share) * scatters), sigma), way);
+    }
+    float density = share > 0.0 ? equiangular_pdf(stretch, s) : 0.0;
+    end.t = path.t_min + s;
+    if (HAS_CHROMATIC) {
+        vec3 collision = medium.sigma_t * exp_minus(path.tau_rgb + medium.sigma_t * s);
+        vec3 ends = exp_minus(path.tau_rgb) * one_minus_exp_minus(medium.sigma_t * way);
+        end.weight = medium.albedo * collision / ((1.0 - share) * dot(weights, collision) + share * dot(weights, ends) * density);
+    } else {
+        end.weight = medium.albedo / (1.0 - share + share * scatters * density / (sigma * exp_minus(sigma * s)));
+    }
+    return end;
+}
+
+// How near to a surface a point of a flight may round to its other side, with some room for rays that graze it.
+float near_distance(Path path, float t) {
+    return 4.0 * offset_distance(max_component(abs(path.origin)) + t);
+}
+
+// Moves a point to its side of a primitive, if rounding left it closer than a surface's own points are kept. `side` is +1 for
+// the side that the normal points to. In a medium that is opaque over a few roundings, a vertex beyond the boundary would
+// start a walk outside that never comes to an end.
+vec3 keep_on_side(Primitive primitive, vec3 point, float side) {
+    if (HAS_SPHERES && (primitive.surface & PRIMITIVE_SPHERE) != 0u) {
+        vec3 offset = point - primitive.a;
+        float distance = length(offset), outwards = side * primitive.b.y;
+        float largest = max_component(abs(primitive.a)) + primitive.b.x;
+        float missing = offset_distance(largest) - outwards * (distance - primitive.b.x);
+        return missing > 0.0 ? point + offset * (outwards * missing / distance) : point;
+    }
+    vec3 normal = normalize(cross(primitive.b - primitive.a, primitive.c - primitive.a));
+    float largest = max_component(max(abs(primitive.a), max(abs(primitive.b), abs(primitive.c))));
+    float missing = offset_distance(largest) - side * dot(point - primitive.a, normal);
+    // Beyond the edge of the primitive its plane means nothing, but then the point is far from it.
+    return missing > 0.0 && missing < 16.0 * offset_distance(largest) ? point + normal * (side * missing) : point;
+}
+
+// The point of a flight at t, on the right side of the surface behind it (`hit`) or before it (`path.last`).
+vec3 flight_point(Path path, Hit hit, float t) {
+    vec3 point = path.origin + path.direction * t;
+    float close = near_distance(path, t);
+    if (hit.primitive != NONE && hit.t - t < close) {
+        point = keep_on_side(PRIMITIVE(hit.primitive), point, hit.along_normal ? -1.0 : 1.0);
+    } else if (path.last != NONE && t - path.t_min < close) {
+        point = keep_on_side(PRIMITIVE(path.last), point, path.last_along_normal ? 1.0 : -1.0);
+    }
+    return point;
+}
+
+// Goes through a boundary. Crossings at one place, `again` but for the first, may come in any order; only their sum counts.
+void enter_medium(inout Path path, uint from, uint to, bool again) {
+    uint base = again || path.medium == NONE ? path.medium_sum : medium_code(path.medium);
+    path.medium_sum = base + medium_code(to) - medium_code(from);
+    uint found = medium_of_code(path.medium_sum, to, params.medium_count);
+    // Where the boundary does not expect the medium in front of it but behind, the vertex lay on the other side by rounding.
+    path.medium = found == NONE && path.medium == to ? to : found;
+}

@@ -1,0 +1,32 @@
+//! How distances are sampled in each medium.
+
+use super::frame::{Bounds, Frame};
+use super::layout::{LIGHT_CONSTANT, Light, Medium};
+use super::nesting::Nesting;
+use crate::scene::{MediumId, Scene};
+
+/// Share of equiangular distances in media that are thin enough for them.
+const SHARE: f32 = 0.5;
+/// Across a medium of more than this optical depth, light does not come from near the lights alone.
+const THIN: f64 = 3.0;
+
+/// Switches equiangular sampling on for media that light from somewhere shines through. Behind glass it never arrives directly,
+/// and in an opaque medium only the first few free paths matter, which free flights sample well.
+pub fn choose_equiangular(scene: &Scene, nesting: &Nesting, frame: &Frame, lights: &[Light], media: &mut [Medium]) {
+    let local = lights.iter().any(|light| light.kind != LIGHT_CONSTANT);
+    if !local || scene.integrator.max_depth.is_some_and(|depth| depth < 2) {
+        return;
+    }
+    for (index, medium) in media.iter_mut().enumerate().skip(1) {
+        let id = Some(MediumId(index as u32 - 1));
+        let mut bounds = Bounds::EMPTY;
+        let filled = scene.shapes.iter().filter(|shape| shape.boundary.is_some_and(|one| one.interior == id));
+        filled.for_each(|shape| bounds = bounds.union(Bounds::of(&shape.geometry)));
+        let within = if bounds.is_empty() { 0.0 } else { f64::from(frame.length((bounds.max - bounds.min).length())) };
+        let extent = if nesting.world == id { 2.0 * frame.radius } else { within };
+        let sigma_t = f64::from(medium.sigma_t.element_sum() / 3.0);
+        if sigma_t > 0.0 && sigma_t * extent < THIN && medium.albedo.max_element() > 0.0 {
+            medium.equiangular = SHARE;
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Mirror of `shaders/lib/path_flight.glsl`: where a flight through a medium ends, at a surface or at a point where it scatters.
+
+use super::bindings::{Light, Medium, Primitive, Tables};
+use super::equiangular::{equiangular_pdf, sample_equiangular, stretch_seen_from};
+use super::light::{is_local, plane_light_point};
+use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
+use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight};
+use super::path_state::{Hit, NONE, Path, choose_light, sample_set};
+use super::ray::offset_distance;
+use crate::pack::layout::{LIGHT_QUAD, LIGHT_TRIANGLE, PRIMITIVE_SPHERE};
+use glam::{DVec2, DVec3, Vec4Swizzles};
+
+/// Sets of random numbers that choose what a segment's equiangular sampling goes by.
+const PIVOT_SET: u32 = 0x4000_0000;
+
+/// The end of a flight.
+#[derive(Clone, Copy, Debug)]
+pub struct FlightEnd {
+    /// In the medium; else at a surface, or nowhere.
+    pub scatters: bool,
+    /// Distance.
+    pub t: f64,
+    /// Of a path that scatters: albedo, transmittance and density of `t` together.
+    pub weight: DVec3,
+}
+
+/// A point of the light, if the light is somewhere.
+fn light_pivot(light: &Light, u: DVec2) -> Option<DVec3> {
+    let on_plane = matches!(light.kind, LIGHT_TRIANGLE | LIGHT_QUAD);
+    let v = if on_plane { plane_light_point(light, u) } else { DVec2::ZERO };
+    let offset = if on_plane { light.edge_1 * v.x + light.edge_2 * v.y } else { DVec3::ZERO };
+    is_local(light).then_some(light.origin + offset)
+}
+
+/// Where the flight ends on a ray that meets a surface at `t_end`, or nothing before `t_end`.
+pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, surface: bool) -> FlightEnd {
+    let mut end = FlightEnd { scatters: !surface && t_end < path.far_end, t: t_end, weight: medium.albedo };
+    let sigma = medium.sigma_t[path.channel as usize];
+    let length = t_end - path.t_min;
+    let mixed = medium.equiangular > 0.0;
+    if mixed {
+        end.scatters = path.tau_left < sigma * length;
+    }
+    if !end.scatters {
+        return end;
+    }
+    let weights = channel_weights(path.throughput);
+    if !mixed {
+        end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * length, medium.sigma_t, medium.albedo);
+        return end;
+    }
+    let scatters = one_minus_exp_minus(sigma * length);
+    let u = (one_minus_exp_minus(path.tau_left) / scatters).min(0.999_999_94);
+    let mut v = sample_set(tables, path, PIVOT_SET + path.segment);
+    let light = &tables.lights[choose_light(tables, &mut v.x) as usize];
+    let pivot = light_pivot(light, v.zw());
+    let share = if pivot.is_some() { medium.equiangular } else { 0.0 };
+    let stretch = stretch_seen_from(pivot.unwrap_or_default(), path.origin, path.direction, path.t_min, t_end);
+    let s = if u < share {
+        sample_equiangular(&stretch, u / share)
+    } else {
+        free_flight(minus_log_1m((u - share) / (1.0 - share) * scatters), sigma).min(length)
+    };
+    let density = if share > 0.0 { equiangular_pdf(&stretch, s) } else { 0.0 };
+    end.t = path.t_min + s;
+    let collision = medium.sigma_t * exp_minus_rgb(path.tau_rgb + medium.sigma_t * s);
+    let ends = exp_minus_rgb(path.tau_rgb) * one_minus_exp_minus_rgb(medium.sigma_t * length);
+    let mixture = (1.0 - share) * weights.dot(collision) + share * weights.dot(ends) * density;
+    end.weight = medium.albedo * collision / mixture;
+    end
+}
+
+/// How near to a surface a point of a flight may round to its other side, with some room for rays that graze it.
+pub fn near_distance(path: &Path, t: f64) -> f64 {
+    4.0 * offset_distance(max_component(path.origin.abs()) + t)
+}
+
+/// Moves a point to its side of a primitive, if it is closer than a surface's own points are kept. `side` is +1 for the side
+/// that the normal points to.
+fn keep_on_side(primitive: &Primitive, point: DVec3, side: f64) -> DVec3 {
+    let Primitive { a, b, c, .. } = *primitive;
+    if primitive.surface & PRIMITIVE_SPHERE != 0 {
+        let offset = point - a;
+        let (distance, outwards) = (offset.length(), side * b.y);
+        let largest = max_component(a.abs()) + b.x;
+        let missing = offset_distance(largest) - outwards * (distance - b.x);
+        return if missing > 0.0 { point + offset * (outwards * missing / distance) } else { point };
+    }
+    let normal = (b - a).cross(c - a).normalize();
+    let largest = max_component(a.abs().max(b.abs().max(c.abs())));
+    let missing = offset_distance(largest) - side * (point - a).dot(normal);
+    if missing > 0.0 && missing < 16.0 * offset_distance(largest) { point + normal * (side * missing) } else { point }
+}
+
+/// The point of a flight at t, on the right side of the surface behind it (`hit`) or before it (`path.last`).
+pub fn flight_point(tables: &Tables, path: &Path, hit: &Hit, t: f64) -> DVec3 {
+    let point = path.origin + path.direction * t;
+    let close = near_distance(path, t);
+    if hit.primitive != NONE && hit.t - t < close {
+        keep_on_side(tables.primitive(hit.primitive), point, if hit.along_normal { -1.0 } else { 1.0 })
+    } else if path.last != NONE && t - path.t_min < close {
+        keep_on_side(tables.primitive(path.last), point, if path.last_along_normal { 1.0 } else { -1.0 })
+    } else {
+        point
+    }
+}
+
+/// Goes through a boundary. Crossings at one place, `again` but for the first, may come in any order; only their sum counts.
+pub fn enter_medium(tables: &Tables, path: &mut Path, from: u32, to: u32, again: bool) {
+    let base = if again || path.medium == NONE { path.medium_sum } else { medium_code(path.medium) };
+    path.medium_sum = base.wrapping_add(medium_code(to)).wrapping_sub(medium_code(from));
+    let found = medium_of_code(path.medium_sum, to, tables.media.len() as u32);
+    // Where the boundary does not expect the medium in front of it but behind, the vertex lay on the other side by rounding.
+    path.medium = if found == NONE && path.medium == to { to } else { found };
+}
