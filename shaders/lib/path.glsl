@@ -125,7 +125,7 @@ void path_advance(inout Path path, Hit hit) {
         Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
         if (HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u) {
             uint inside = surface.media & 0xffffu, outside = surface.media >> 16u;
-            bool again = t == path.t_min && path.last != NONE;
+            bool again = path.last != NONE && t - path.t_min < near_distance(path, t);
             enter_medium(path, hit.along_normal ? inside : outside, hit.along_normal ? outside : inside, again);
             path.t_min = t;
             path.last = hit.primitive;

@@ -83,14 +83,14 @@ vec3 keep_on_side(Primitive primitive, vec3 point, float side) {
         vec3 offset = point - primitive.a;
         float distance = length(offset), outwards = side * primitive.b.y;
         float largest = max_component(abs(primitive.a)) + primitive.b.x;
-        float missing = offset_distance(largest) - outwards * (distance - primitive.b.x);
+        float missing = vertex_clearance(largest) - outwards * (distance - primitive.b.x);
         return missing > 0.0 ? point + offset * (outwards * missing / distance) : point;
     }
     vec3 normal = normalize(cross(primitive.b - primitive.a, primitive.c - primitive.a));
     float largest = max_component(max(abs(primitive.a), max(abs(primitive.b), abs(primitive.c))));
-    float missing = offset_distance(largest) - side * dot(point - primitive.a, normal);
+    float missing = vertex_clearance(largest) - side * dot(point - primitive.a, normal);
     // Beyond the edge of the primitive its plane means nothing, but then the point is far from it.
-    return missing > 0.0 && missing < 16.0 * offset_distance(largest) ? point + normal * (side * missing) : point;
+    return missing > 0.0 && missing < 64.0 * vertex_clearance(largest) ? point + normal * (side * missing) : point;
 }
 
 // The point of a flight at t, on the right side of the surface behind it (`hit`) or before it (`path.last`).
@@ -105,7 +105,8 @@ vec3 flight_point(Path path, Hit hit, float t) {
     return point;
 }
 
-// Goes through a boundary. Crossings at one place, `again` but for the first, may come in any order; only their sum counts.
+// Goes through a boundary. Crossings at one place, `again` but for the first, may come in any order (rounding
+// alone decides, where faces coincide); only their sum counts.
 void enter_medium(inout Path path, uint from, uint to, bool again) {
     uint base = again || path.medium == NONE ? path.medium_sum : medium_code(path.medium);
     path.medium_sum = base + medium_code(to) - medium_code(from);

@@ -7,7 +7,7 @@
 // Weight of a direction found by scattering that light sampling finds with density light_pdf: the balance heuristic (Veach and
 // Guibas 1995). Scattering finds the light only if the flight survives, so its probability to do so is part of the density.
 float scattering_mis_weight(Path path, float survival, float light_pdf) {
-    float found = path.pdf * survival;
+    float found = HAS_MIS ? path.pdf * survival : 0.0;
     return path.pdf == 0.0 || light_pdf == 0.0 ? 1.0 : found / (found + light_pdf);
 }
 
@@ -71,7 +71,7 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u, float lobe) {
     path.light = index;
     path.light_channels = path.throughput * scattering.value;
     path.light_weight = path.light_channels * found.weight / light.probability;
-    path.pdf_ratio = found.pdf > 0.0 ? scattering.pdf / (found.pdf * light.probability) : 0.0;
+    path.pdf_ratio = HAS_MIS && found.pdf > 0.0 ? scattering.pdf / (found.pdf * light.probability) : 0.0;
     path.light_medium = medium_towards(vertex, path.medium, found.direction);
     path.origin = offset_origin(path, found.direction);
     return max_component(path.light_weight) > 0.0 || !is_finite(path.light_weight);

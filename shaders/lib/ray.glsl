@@ -67,3 +67,9 @@ vec2 intersect_sphere(Ray ray, vec3 center, float radius) {
 float offset_distance(float largest_coordinate) {
     return 4e-7 * largest_coordinate;
 }
+
+// How far from a surface a vertex in a medium is kept: one rounding of the largest coordinate, enough for its rays to find the
+// surface. More would matter in a medium whose mean free path is not much longer.
+float vertex_clearance(float largest_coordinate) {
+    return 1.2e-7 * largest_coordinate;
+}

@@ -43,6 +43,9 @@ pub struct Features {
     pub hide_emitters: bool,
     /// Light is sampled at the vertices of paths.
     pub light_sampling: bool,
+    /// Light that scattering finds by chance and light that is sampled are combined by multiple importance sampling. Without,
+    /// light sampling finds all that it can find: for comparisons.
+    pub mis: bool,
     /// Longest path; `u32::MAX` is no limit.
     pub max_depth: u32,
     /// Depth from which Russian roulette may end a path.
@@ -84,6 +87,7 @@ impl Features {
             },
             hide_emitters,
             light_sampling,
+            mis: true,
             max_depth,
             rr_depth,
             node_copies: packed.bvh.copies,
@@ -135,6 +139,7 @@ impl Features {
             ("HAS_FAR_CLIP", self.far_clip),
             ("HAS_HIDDEN_EMITTERS", self.hide_emitters),
             ("HAS_LIGHT_SAMPLING", self.light_sampling),
+            ("HAS_MIS", self.mis),
         ]
         .map(|(name, value)| format!("const bool {name} = {value};\n"))
         .concat();

@@ -171,6 +171,7 @@ const EMPTY_FEATURES: Features = Features {
     far_clip: false,
     hide_emitters: false,
     light_sampling: false,
+    mis: true,
     max_depth: 0,
     rr_depth: 0,
     node_copies: 8,

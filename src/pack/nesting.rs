@@ -31,7 +31,7 @@ impl Nesting {
         let eye = scene.camera.to_world.w_axis.truncate();
         let mut warnings = Vec::new();
 
-        let around_camera = innermost(&enclosures, eye, None);
+        let around_camera = innermost(&enclosures, eye, |_| true);
         // A medium named by the camera fills the space outside of all boundaries, unless the camera stands inside of one:
         // then the name only repeats what that boundary says.
         let world = if around_camera.is_some() { None } else { scene.camera.medium };
@@ -56,8 +56,10 @@ impl Nesting {
                 continue;
             }
             let mut votes: Vec<(Option<MediumId>, usize)> = Vec::new();
+            let own = volume(&shape.geometry);
             for probe in probes(&shape.geometry) {
-                let medium = innermost(&enclosures, probe, Some(index)).map_or(world, |enclosure| enclosure.interior);
+                let around = |enclosure: &Enclosure| enclosure.is_around(index, own);
+                let medium = innermost(&enclosures, probe, around).map_or(world, |enclosure| enclosure.interior);
                 match votes.iter_mut().find(|(candidate, _)| *candidate == medium) {
                     Some((_, count)) => *count += 1,
                     None => votes.push((medium, 1)),
@@ -92,6 +94,7 @@ struct Enclosure<'a> {
     geometry: &'a Geometry,
     bounds: Bounds,
     interior: Option<MediumId>,
+    volume: f64,
 }
 
 impl<'a> Enclosure<'a> {
@@ -102,7 +105,14 @@ impl<'a> Enclosure<'a> {
             geometry: &value.geometry,
             bounds: Bounds::of(&value.geometry),
             interior: boundary.interior,
+            volume: volume(&value.geometry),
         })
+    }
+
+    /// Whether it can enclose another shape, of a volume: it is larger. Of two that are the same, the first encloses the second.
+    fn is_around(&self, shape: usize, volume: f64) -> bool {
+        self.shape != shape
+            && (self.volume.abs() > volume.abs() || (self.volume.abs() == volume.abs() && self.shape < shape))
     }
 
     fn contains(&self, point: DVec3) -> bool {
@@ -110,41 +120,56 @@ impl<'a> Enclosure<'a> {
     }
 }
 
-/// The smallest region that holds a point. Regions that hold the same point are nested, so the smallest is the innermost.
+/// The smallest region that holds a point, among some. Regions that hold the same point are nested, so the smallest is the
+/// innermost.
 fn innermost<'a, 'b>(
     enclosures: &'b [Enclosure<'a>],
     point: DVec3,
-    except: Option<usize>,
+    among: impl Fn(&Enclosure) -> bool,
 ) -> Option<&'b Enclosure<'a>> {
-    let volume = |enclosure: &Enclosure| (enclosure.bounds.max - enclosure.bounds.min).element_product();
     enclosures
         .iter()
-        .filter(|enclosure| Some(enclosure.shape) != except && enclosure.contains(point))
-        .min_by(|a, b| volume(a).total_cmp(&volume(b)))
+        .filter(|enclosure| among(enclosure) && enclosure.contains(point))
+        .min_by(|a, b| a.volume.abs().total_cmp(&b.volume.abs()))
 }
 
-/// Points just outside of a surface.
+/// Points next to a surface, on the side where what is around it can be asked for: just inside, so that faces which it shares with
+/// what encloses it do not count as outside of that; or just outside of a surface that is inside out.
 fn probes(geometry: &Geometry) -> Vec<DVec3> {
     match geometry {
-        Geometry::Sphere { center, radius, flipped } => {
-            let distance = radius * if *flipped { 1.0 - 1e-6 } else { 1.0 + 1e-6 };
-            [DVec3::X, DVec3::Y, DVec3::Z]
-                .iter()
-                .flat_map(|axis| [*center + *axis * distance, *center - *axis * distance])
-                .collect()
-        }
+        Geometry::Sphere { center, radius, .. } => [DVec3::X, DVec3::Y, DVec3::Z]
+            .iter()
+            .flat_map(|axis| [*center + *axis * radius * (1.0 - 1e-6), *center - *axis * radius * (1.0 - 1e-6)])
+            .collect(),
         Geometry::Mesh(mesh) => {
             let stride = mesh.triangles.len().div_ceil(PROBES).max(1);
-            mesh.triangles.iter().step_by(stride).map(|triangle| outside_of(mesh, triangle)).collect()
+            mesh.triangles.iter().step_by(stride).map(|triangle| inside_of(mesh, triangle)).collect()
         }
     }
 }
 
-fn outside_of(mesh: &Mesh, triangle: &[u32; 3]) -> DVec3 {
+/// Volume within a closed surface; negative if it is inside out.
+fn volume(geometry: &Geometry) -> f64 {
+    match geometry {
+        Geometry::Sphere { radius, flipped, .. } => {
+            4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) * if *flipped { -1.0 } else { 1.0 }
+        }
+        Geometry::Mesh(mesh) => {
+            let Some(&origin) = mesh.positions.first() else { return 0.0 };
+            let six_fold = |triangle: &[u32; 3]| {
+                let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize] - origin);
+                a.dot(b.cross(c))
+            };
+            mesh.triangles.iter().map(six_fold).sum::<f64>() / 6.0
+        }
+    }
+}
+
+fn inside_of(mesh: &Mesh, triangle: &[u32; 3]) -> DVec3 {
     let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize]);
     let normal = (b - a).cross(c - a).normalize_or_zero();
     let size = (b - a).length().max((c - a).length());
-    (a + b + c) / 3.0 + normal * size * 1e-6
+    (a + b + c) / 3.0 - normal * size * 1e-6
 }
 
 /// How often a surface winds about a point: 1 inside of a closed surface, −1 if it is inside out, 0 outside.

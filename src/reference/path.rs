@@ -6,7 +6,7 @@ use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
 use super::math::{exp_minus_rgb, max_component, to_frame};
 use super::medium::channel_weights;
-use super::path_flight::{end_flight, enter_medium, flight_point};
+use super::path_flight::{end_flight, enter_medium, flight_point, near_distance};
 use super::path_lights::{add_constant_light, add_emission, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
@@ -119,7 +119,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         if primitive.surface & PRIMITIVE_BOUNDARY != 0 {
             let (inside, outside) = (surface.media & 0xffff, surface.media >> 16);
             let (from, to) = if hit.along_normal { (inside, outside) } else { (outside, inside) };
-            let again = t == path.t_min && path.last != NONE;
+            let again = path.last != NONE && t - path.t_min < near_distance(path, t);
             enter_medium(tables, path, from, to, again);
             path.t_min = t;
             path.last = hit.primitive;

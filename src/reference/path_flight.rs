@@ -6,7 +6,7 @@ use super::light::{is_local, plane_light_point};
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
 use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight};
 use super::path_state::{Hit, NONE, Path, choose_light, sample_set};
-use super::ray::offset_distance;
+use super::ray::{offset_distance, vertex_clearance};
 use crate::pack::layout::{LIGHT_QUAD, LIGHT_TRIANGLE, PRIMITIVE_SPHERE};
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
@@ -83,13 +83,13 @@ fn keep_on_side(primitive: &Primitive, point: DVec3, side: f64) -> DVec3 {
         let offset = point - a;
         let (distance, outwards) = (offset.length(), side * b.y);
         let largest = max_component(a.abs()) + b.x;
-        let missing = offset_distance(largest) - outwards * (distance - b.x);
+        let missing = vertex_clearance(largest) - outwards * (distance - b.x);
         return if missing > 0.0 { point + offset * (outwards * missing / distance) } else { point };
     }
     let normal = (b - a).cross(c - a).normalize();
     let largest = max_component(a.abs().max(b.abs().max(c.abs())));
-    let missing = offset_distance(largest) - side * (point - a).dot(normal);
-    if missing > 0.0 && missing < 16.0 * offset_distance(largest) { point + normal * (side * missing) } else { point }
+    let missing = vertex_clearance(largest) - side * (point - a).dot(normal);
+    if missing > 0.0 && missing < 64.0 * vertex_clearance(largest) { point + normal * (side * missing) } else { point }
 }
 
 /// The point of a flight at t, on the right side of the surface behind it (`hit`) or before it (`path.last`).
@@ -105,7 +105,8 @@ pub fn flight_point(tables: &Tables, path: &Path, hit: &Hit, t: f64) -> DVec3 {
     }
 }
 
-/// Goes through a boundary. Crossings at one place, `again` but for the first, may come in any order; only their sum counts.
+/// Goes through a boundary. Crossings at one place, `again` but for the first, may come in any order; only their
+/// sum counts.
 pub fn enter_medium(tables: &Tables, path: &mut Path, from: u32, to: u32, again: bool) {
     let base = if again || path.medium == NONE { path.medium_sum } else { medium_code(path.medium) };
     path.medium_sum = base.wrapping_add(medium_code(to)).wrapping_sub(medium_code(from));

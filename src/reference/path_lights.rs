@@ -13,8 +13,8 @@ use glam::{DVec2, DVec3};
 
 /// Weight of a direction found by scattering that light sampling finds with density `light_pdf`: the balance heuristic
 /// (Veach and Guibas 1995).
-pub fn scattering_mis_weight(path: &Path, survival: f64, light_pdf: f64) -> f64 {
-    let found = path.pdf * survival;
+pub fn scattering_mis_weight(tables: &Tables, path: &Path, survival: f64, light_pdf: f64) -> f64 {
+    let found = if tables.features.mis { path.pdf * survival } else { 0.0 };
     if path.pdf == 0.0 || light_pdf == 0.0 { 1.0 } else { found / (found + light_pdf) }
 }
 
@@ -31,7 +31,7 @@ pub fn add_constant_light(tables: &Tables, path: &mut Path) {
     for light in tables.lights.iter().filter(|light| light.kind == LIGHT_CONSTANT) {
         // Light sampling takes its directions from the same scattering function (see `sample_light`).
         let light_pdf = if tables.features.light_sampling { light.probability * path.pdf } else { 0.0 };
-        let weight = scattering_mis_weight(path, survival(path), light_pdf);
+        let weight = scattering_mis_weight(tables, path, survival(path), light_pdf);
         path.radiance += survived_throughput(path) * light.radiance * weight;
     }
 }
@@ -49,7 +49,7 @@ pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: 
         area_pdf(light.area, t, cos_light)
     };
     let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
-    let weight = scattering_mis_weight(path, survival(path), light_pdf);
+    let weight = scattering_mis_weight(tables, path, survival(path), light_pdf);
     path.radiance += survived_throughput(path) * light.radiance * weight;
 }
 
@@ -78,7 +78,8 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
     path.light = index;
     path.light_channels = path.throughput * scattering.value;
     path.light_weight = path.light_channels * found.weight / light.probability;
-    path.pdf_ratio = if found.pdf > 0.0 { scattering.pdf / (found.pdf * light.probability) } else { 0.0 };
+    path.pdf_ratio =
+        if tables.features.mis && found.pdf > 0.0 { scattering.pdf / (found.pdf * light.probability) } else { 0.0 };
     path.light_medium = medium_towards(tables, vertex, path.medium, found.direction);
     path.origin = offset_origin(path, found.direction);
     max_component(path.light_weight) > 0.0 || !path.light_weight.is_finite()

@@ -82,3 +82,8 @@ pub fn intersect_sphere(ray: &Ray, center: DVec3, radius: f64) -> DVec2 {
 pub fn offset_distance(largest_coordinate: f64) -> f64 {
     4e-7 * largest_coordinate
 }
+
+/// How far from a surface a vertex in a medium is kept: one rounding of the largest coordinate.
+pub fn vertex_clearance(largest_coordinate: f64) -> f64 {
+    1.2e-7 * largest_coordinate
+}
