@@ -78,6 +78,8 @@ fn equiangular_distances_change_no_expectation() {
             let point = |position| {
                 move |scene: &mut Scene| {
                     scene.lights.push(Light::Point { position, intensity: v(2.0, 3.0, 1.0) });
+                    // Longer paths come arbitrarily close to a point: their variance is infinite.
+                    scene.integrator.max_depth = Some(2);
                 }
             };
             add("point inside", &point(v(0.2, 1.0, 0.1)));
@@ -98,7 +100,7 @@ fn equiangular_distances_change_no_expectation() {
         let mut with = packed(&scene, seed);
         with.media[1].equiangular = 0.4;
         with.features.equiangular = true;
-        check(&name, &with, &without_equiangular(packed(&scene, seed + 1)), 4096);
+        check(&name, &with, &without_equiangular(packed(&scene, seed + 1)), 1024);
     }
 }
 
