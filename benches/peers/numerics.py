@@ -69,10 +69,10 @@ def cases():
     for scale in (1.0, 1e-3, 1e-4, 1e-6):
         yield f"absorption, cube of side {scale:g}", (absorbs,) * 3, before(scale, medium(1.0 / scale, 0.0))
     yield "absorption, translated by 1e5 sides", (absorbs,) * 3, before(1.0, medium(1.0, 0.0), at=(1e5, -1e5, 1e5))
-    # Chandrasekhar's H functions: H(1) and the moments give 1 - sqrt(1 - albedo) H(1) = .2855 for normal incidence.
+    # Chandrasekhar's H functions: H(1) and the moments give 1 - sqrt(1 - albedo) H(1) = .28525 for normal incidence.
     for sigma in (1e2, 1e3, 1e4, 1e5):
-        yield f"half space, albedo .8, {sigma:g} mean free paths", (0.2855,) * 3, before(1.0, medium(sigma, 0.8))
-    yield "half space, albedo .8, side 1e-4, 1000 mean free paths", (0.2855,) * 3, before(1e-4, medium(1e7, 0.8))
+        yield f"half space, albedo .8, {sigma:g} mean free paths", (0.28525,) * 3, before(1.0, medium(sigma, 0.8))
+    yield "half space, albedo .8, side 1e-4, 1000 mean free paths", (0.28525,) * 3, before(1e-4, medium(1e7, 0.8))
     for g in (0.9999, -0.9999):
         yield f"furnace, g = {g}", (1.0,) * 3, before(1.0, medium(3.0, 1.0, g))
     yield "furnace, extinction (.1, 1, 10)", (1.0,) * 3, before(1.0, medium((0.1, 1.0, 10.0), 1.0), spp=4096)
