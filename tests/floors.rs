@@ -84,10 +84,11 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("sampler", &["rng"]),
     ("bsdf", &["math", "warp"]),
     ("light", &["math", "warp"]),
+    ("sky", &["math"]),
     ("medium", &["math"]),
     ("path_state", &["math", "sampler", "medium"]),
     ("path_vertex", &["path_state", "warp", "ray", "phase", "bsdf"]),
-    ("path_lights", &["path_state", "path_vertex", "light"]),
+    ("path_lights", &["path_state", "path_vertex", "light", "sky"]),
     ("path_rays", &["path_state", "ray"]),
     ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "camera"]),
 ];

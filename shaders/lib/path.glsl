@@ -56,7 +56,7 @@ void scatter(inout Path path, Vertex vertex) {
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
-    path.shadow = (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface)) && sample_light(path, vertex, u.xy, u.z);
+    path.shadow = (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface)) && sample_light(path, vertex, u.xy, u.zw);
     path.next_direction = next.direction;
     path.next_medium = medium_towards(vertex, path.medium, next.direction);
     path.throughput *= next.weight;
@@ -105,7 +105,7 @@ void path_advance(inout Path path, Hit hit) {
         }
     }
     if (!surface_hit && t >= path.far_end) {
-        add_constant_light(path);
+        add_sky(path);
         path.alive = false;
         path.shadow = false;
         return;

@@ -38,6 +38,7 @@ sources! {
     "lib/ray.glsl",
     "lib/rng.glsl",
     "lib/sampler.glsl",
+    "lib/sky.glsl",
     "lib/warp.glsl",
     "units/bsdf.comp",
     "units/bvh.comp",
@@ -50,6 +51,7 @@ sources! {
     "units/ray.comp",
     "units/rng.comp",
     "units/sampler.comp",
+    "units/sky.comp",
     "units/warp.comp",
 }
 

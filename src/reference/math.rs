@@ -17,6 +17,12 @@ pub fn exp_minus_rgb(x: DVec3) -> DVec3 {
     DVec3::new(exp_minus(x.x), exp_minus(x.y), exp_minus(x.z))
 }
 
+/// The angle of the point (x, y) from the x axis, in \[−π, π\]; 0 at the origin.
+pub fn arctan2(y: f64, x: f64) -> f64 {
+    // The kernel knows no difference between the zeros.
+    if x == 0.0 && y == 0.0 { 0.0 } else { (y + 0.0).atan2(x) }
+}
+
 /// Two unit vectors (tangent, bitangent) that make up a right-handed frame with the unit vector n: tangent × bitangent
 /// = n (Duff et al. 2017).
 pub fn orthonormal_frame(n: DVec3) -> (DVec3, DVec3) {

@@ -6,7 +6,7 @@ use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
 use super::math::{exp_minus_rgb, max_component, to_frame};
 use super::medium::{channel_weights, cross_boundary, scatter_weight};
-use super::path_lights::{add_constant_light, add_emission, sample_light};
+use super::path_lights::{add_emission, add_sky, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_set, survived_throughput};
@@ -57,7 +57,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
     path.shadow =
-        (vertex.in_medium || bsdf_has_density(&vertex.surface)) && sample_light(tables, path, vertex, u.xy(), u.z);
+        (vertex.in_medium || bsdf_has_density(&vertex.surface)) && sample_light(tables, path, vertex, u.xy(), u.zw());
     path.next_direction = next.direction;
     path.next_medium = medium_towards(vertex, path.medium, next.direction);
     path.throughput *= next.weight;
@@ -99,7 +99,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
     path.tau_left -= way * medium.sigma_t[path.channel as usize];
     path.tau_rgb += medium.sigma_t * way;
     if !surface_hit && t >= path.far_end {
-        add_constant_light(tables, path);
+        add_sky(tables, path);
         path.alive = false;
         path.shadow = false;
         return;
