@@ -239,7 +239,12 @@ fn the_sky_is_drawn_as_its_density_says() {
         if name == "sunny" {
             check_drawn(&map, &answers, |u, y| pdf(1.0 - u, y)).expect_err("u the wrong way round");
             check_drawn(&map, &answers, |u, y| pdf(u, -y)).expect_err("upside down");
-            check_drawn(&map, &answers, |u, y| pdf(u, y) * if y > 0.0 { 1.02 } else { 0.98 }).expect_err("2 % off");
+        }
+        if name == "smallest" {
+            // Few bins and many samples show a density that is 2 % too large in one half, and too small in the other.
+            let many = map.draw(1_000_000, &mut Random(seed));
+            check_drawn(&map, &many, pdf).unwrap_or_else(|why| panic!("{name}: {why}"));
+            check_drawn(&map, &many, |u, y| pdf(u, y) * if u < 0.5 { 1.02 } else { 0.98 }).expect_err("2 % off");
         }
         for answer in &answers {
             assert!((answer.direction().length() - 1.0).abs() < 2e-6, "{name}: {}", answer.direction());
