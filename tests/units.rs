@@ -8,7 +8,11 @@ use common::scenes::v;
 use common::tolerances::comparison;
 use common::units::{run, vec4, widen};
 use glam::{DVec2, DVec3, Vec3};
-use tyndall::pack::layout::{self, INFINITE_DISTANCE, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_TRIANGLE, Light};
+use std::f64::consts::PI;
+use tyndall::pack::layout::{
+    self, INFINITE_DISTANCE, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_TRIANGLE,
+    Light,
+};
 use tyndall::pack::lights::alias_table;
 use tyndall::pack::sobol;
 use tyndall::reference::{bindings, camera, film, light, math, medium, phase, rng, sampler, warp};
@@ -77,17 +81,27 @@ fn elementary_functions() {
         let x = if k < extremes.len() { extremes[k] } else { random.log_between(1e-12, 87.0) };
         let axes = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Z, v(1e-4, 0.0, -1.0), v(0.0, 1e-20, -1.0)];
         let n = if k < axes.len() { axes[k] } else { random.direction() };
-        inputs.extend([vec4(&[u, x]), vec4(&n.to_array())]);
+        // Of arctan2: all signs of the corner cases, then anything; rounded to what the kernel gets.
+        let special = [0.0, 1.0, -1.0, 1e-30, -1e-30, 0.41421357, -0.41421357, 0.41421354, 2.4142135, 1e30];
+        let [y, x_of_angle] = if k < 100 {
+            [special[k / 10], special[k % 10]]
+        } else {
+            [0; 2].map(|_| random.log_between(1e-9, 1e9) * if random.unit() < 0.5 { 1.0 } else { -1.0 })
+        };
+        inputs.extend([vec4(&[u, x, y, x_of_angle]), vec4(&n.to_array())]);
     }
     let outputs: Vec<[f32; 4]> = run("math", &inputs, &[], inputs.len() / 2, inputs.len() / 2 * 3);
     let mut log = comparison("minus_log_1m");
     let mut exp = comparison("exp_minus");
     let mut frame = comparison("orthonormal_frame");
+    let mut angle = comparison("arctan2");
     for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
         let [u, x] = [input[0][0], input[0][1]].map(f64::from);
         log.scalar(u, output[0][0], math::minus_log_1m(u));
         // What lies below the smallest normal number is 0.
         exp.scalar(x, output[0][1], math::exp_minus(x));
+        let [y, x_of_angle] = [input[0][2], input[0][3]].map(f64::from);
+        angle.scalar(format!("{y}, {x_of_angle}"), output[0][2], math::arctan2(y, x_of_angle));
         let n = widen(&input[1][..3]);
         let (tangent, bitangent) = math::orthonormal_frame(n);
         frame.vector(n, &output[1][..3], tangent);
@@ -96,6 +110,7 @@ fn elementary_functions() {
     }
     log.finish();
     exp.finish();
+    angle.finish();
     frame.finish();
 }
 
@@ -224,8 +239,11 @@ fn lights() -> Vec<Light> {
         sphere(Vec3::ZERO, 4.0, -1.0),
         sphere(Vec3::new(0.5, 0.5, 0.5), 1e-3, 1.0),
         point,
+        Light { kind: LIGHT_SPOT, edge_1: Vec3::new(1.9, 0.8, 1.0 / 1.1), normal: Vec3::NEG_Y, ..point },
+        Light { kind: LIGHT_SPOT, edge_1: Vec3::new(PI as f32, PI as f32, 0.0), normal: Vec3::X, ..point },
+        Light { kind: LIGHT_DIRECTIONAL, normal: Vec3::new(0.6, -0.8, 0.0), radiance: Vec3::ONE, ..Light::default() },
     ];
-    let table = alias_table(&[0.3, 0.2, 0.25, 0.05, 0.01, 0.19]);
+    let table = alias_table(&[0.3, 0.2, 0.15, 0.05, 0.01, 0.19, 0.03, 0.02, 0.05]);
     for (light, (threshold, alias)) in lights.iter_mut().zip(table) {
         light.alias_threshold = threshold as f32;
         light.alias = alias;
@@ -247,9 +265,17 @@ fn light_sources() {
     }
     let count = inputs.len() / 2;
     let outputs: Vec<[f32; 4]> = run("light", &inputs, &[bytemuck::cast_slice(&lights)], count, 3 * count);
-    let names =
-        ["light direction", "light distance", "sphere light distance", "light weight", "light pdf", "alias rescaled"];
-    let [mut direction, mut distance, mut sphere_distance, mut weight, mut pdf, mut rescaled] = names.map(comparison);
+    let names = [
+        "light direction",
+        "light distance",
+        "sphere light distance",
+        "light weight",
+        "light pdf",
+        "alias rescaled",
+        "spot weight",
+    ];
+    let [mut direction, mut distance, mut sphere_distance, mut weight, mut pdf, mut rescaled, mut spot_weight] =
+        names.map(comparison);
     for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
         let point = widen(&input[0][..3]);
         let u = DVec2::new(f64::from(input[1][0]), f64::from(input[0][3]));
@@ -258,6 +284,8 @@ fn light_sources() {
         let case = format!("light {index}, {input:?}");
         let (found, asked) = match light.kind {
             LIGHT_POINT => (light::sample_point_light(light, point), 0.0),
+            LIGHT_SPOT => (light::sample_spot_light(light, point), 0.0),
+            LIGHT_DIRECTIONAL => (light::sample_directional_light(light), 0.0),
             LIGHT_SPHERE => {
                 let asked = light::sphere_light_pdf(light.edge_1.x, point.distance(light.origin));
                 (light::sample_sphere_light(light, point, u), asked)
@@ -282,7 +310,13 @@ fn light_sources() {
             } else {
                 distance.scalar(&case, output[0][3], found.distance);
             }
-            weight.vector(&case, &output[1][..3], found.weight);
+            if light.kind == LIGHT_SPOT {
+                // The falloff has an absolute error: that of the angle, times the slope.
+                let full = light::sample_point_light(light, point).weight.x;
+                spot_weight.scalar(&case, (f64::from(output[1][0]) / full) as f32, found.weight.x / full);
+            } else {
+                weight.vector(&case, &output[1][..3], found.weight);
+            }
             pdf.scalar(&case, output[1][3], found.pdf);
             if asked.is_finite() {
                 pdf.scalar(&case, output[2][0], asked);
@@ -300,7 +334,7 @@ fn light_sources() {
         }
         assert!((0.0..1.0).contains(&output[2][2]), "{case}: the rescaled number is {}", output[2][2]);
     }
-    [direction, distance, sphere_distance, weight, pdf, rescaled].into_iter().for_each(Comparison::finish);
+    [direction, distance, sphere_distance, weight, pdf, rescaled, spot_weight].into_iter().for_each(Comparison::finish);
 }
 
 #[test]

@@ -23,7 +23,7 @@ Stretch stretch_seen_from(vec3 point, vec3 origin, vec3 direction, float t_begin
     stretch.extent = min(t_end - t_begin, MAX_EQUIANGULAR_LENGTH);
     // tan(b - a) = (tan b - tan a) / (1 + tan a tan b): no difference of angles.
     float d = stretch.distance;
-    stretch.angle = arctangent(d * stretch.extent, d * d + stretch.begin * (stretch.begin + stretch.extent));
+    stretch.angle = arctan2(d * stretch.extent, d * d + stretch.begin * (stretch.begin + stretch.extent));
     return stretch;
 }
 

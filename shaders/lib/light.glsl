@@ -7,8 +7,8 @@
 struct LightSample {
     vec3 direction;  // unit
     float distance;  // to the sampled point
-    vec3 weight;     // radiance / density per solid angle; of a point: intensity / distance^2; 0 if nothing arrives
-    float pdf;       // per solid angle, without the choice of the light; 0 for a point, which no other technique finds
+    vec3 weight;     // radiance / density per solid angle; of a point: intensity / distance^2; of parallel light: irradiance; 0 if nothing arrives
+    float pdf;       // per solid angle, without the choice of the light; 0 for a point, a spot and parallel light, which no other technique finds
 };
 
 // One line of the alias table (Walker 1977): `u` in [0, 1) is split into a choice and a number that is uniform again.
@@ -33,7 +33,8 @@ float area_pdf(float area, float distance, float cos_light) {
 
 // Whether a light is at some place, not infinitely far.
 bool is_local(Light light) {
-    return light.kind != LIGHT_CONSTANT;
+    uint kind = light.kind & 0xffu;
+    return kind != LIGHT_CONSTANT && kind != LIGHT_DIRECTIONAL && kind != LIGHT_ENVMAP;
 }
 
 // Coordinates along the two edges of a uniform point of a triangle or parallelogram.
@@ -100,4 +101,24 @@ LightSample sample_point_light(Light light, vec3 point) {
     float distance = sqrt(squared);
     return squared > 0.0 ? LightSample(offset / distance, distance, light.radiance / squared, 0.0)
                          : LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
+}
+
+// Share of its intensity that a spot sends at an angle from its axis: all of it within the beam, then less by a straight line down
+// to nothing at the cutoff.
+float spot_falloff(Light light, float angle) {
+    float cutoff = light.edge_1.x, beam = light.edge_1.y;
+    return angle <= beam ? 1.0 : max(cutoff - angle, 0.0) * light.edge_1.z;
+}
+
+LightSample sample_spot_light(Light light, vec3 point) {
+    LightSample result = sample_point_light(light, point);
+    // The angle between unit vectors a and b is 2 atan2(|a - b|, |a + b|), without cancellation (Kahan 2006, section 12).
+    vec3 away = -result.direction;
+    result.weight *= spot_falloff(light, 2.0 * arctan2(length(away - light.normal), length(away + light.normal)));
+    return result;
+}
+
+// The one direction from which parallel light comes; the weight is the irradiance.
+LightSample sample_directional_light(Light light) {
+    return LightSample(-light.normal, INFINITE_DISTANCE, light.radiance, 0.0);
 }

@@ -45,18 +45,20 @@ vec3 one_minus_exp_minus(vec3 x) {
     return vec3(one_minus_exp_minus(x.x), one_minus_exp_minus(x.y), one_minus_exp_minus(x.z));
 }
 
-// The angle of (x, y) for y >= 0, in [0, pi], with a relative error below 3e-7; pi / 2 for (0, 0). Drivers' atan() is good to some
-// four digits. On [0, 1] the argument is moved to |t| <= tan(pi/8), where Moshier's polynomial (Cephes library, 1989) holds.
-float arctangent(float y, float x) {
-    float a = abs(x);
-    float ratio = min(y, a) / max(max(y, a), 1e-37);
-    bool upper = ratio > 0.41421356;
-    float t = upper ? (ratio - 1.0) / (ratio + 1.0) : ratio;
-    float z = t * t;
-    float angle = t + t * z * (-0.333329491539 + z * (0.199777106478 + z * (-0.138776856032 + z * 0.0805374449538)));
-    angle += upper ? 0.78539816 : 0.0;
-    angle = y > a || a == 0.0 ? 1.57079633 - angle : angle;
-    return x < 0.0 ? PI - angle : angle;
+// The angle of the point (x, y) from the x axis, in [-pi, pi]; 0 at the origin. Relative error below 3e-7, also of angles next to
+// 0; drivers promise 4096 units in the last place. The quotient of the smaller by the larger coordinate is moved by 45 degrees if it
+// exceeds tan(22.5 degrees), by atan a = pi/4 + atan((a - 1)/(a + 1)); then comes a polynomial, interpolated at Chebyshev's points
+// with an error of 3e-9.
+float arctan2(float y, float x) {
+    float least = min(abs(x), abs(y)), most = max(abs(x), abs(y));
+    bool turned = least > 0.41421356 * most;
+    float s = turned ? (least - most) / (least + most) : (most > 0.0 ? least / most : 0.0);
+    float z = s * s;
+    float tail = z * (-0.33333331 + z * (0.19999547 + z * (-0.14264116 + z * (0.10745036 + z * -0.064551845))));
+    float angle = (turned ? 0.25 * PI : 0.0) + (s + s * tail);
+    angle = abs(y) > abs(x) ? 0.5 * PI - angle : angle;
+    angle = x < 0.0 ? PI - angle : angle;
+    return y < 0.0 ? -angle : angle;
 }
 
 // Two unit vectors that make up a right-handed frame with the unit vector n: tangent x bitangent = n (Duff et al. 2017).

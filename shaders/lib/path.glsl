@@ -57,7 +57,7 @@ void scatter(inout Path path, Vertex vertex) {
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
-    path.shadow = (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface)) && sample_light(path, vertex, u.xy, u.z);
+    path.shadow = (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface)) && sample_light(path, vertex, u.xy, u.zw);
     path.next_direction = next.direction;
     path.next_medium = medium_towards(vertex, path.medium, next.direction);
     path.throughput *= next.weight;
@@ -94,7 +94,7 @@ void path_advance(inout Path path, Hit hit) {
     float t = surface_hit ? hit.t : path.t_max;
 
     Medium medium;
-    FlightEnd end = FlightEnd(false, t, vec3(0.0));
+    FlightEnd end = FlightEnd(false, 0.0, vec3(0.0));
     if (HAS_MEDIA) {
         medium = MEDIUM(valid_medium(path.medium));
         end = end_flight(path, medium, t, surface_hit);
@@ -103,7 +103,7 @@ void path_advance(inout Path path, Hit hit) {
         path.offset = 0.0;
         path.normal = path.direction;
         Surface none;
-        scatter(path, Vertex(flight_point(path, hit, end.t), path.direction, true, medium.g, end.weight, none, vec3(0.0)));
+        scatter(path, Vertex(flight_point(path, hit, end.way), path.direction, true, medium.g, end.weight, none, vec3(0.0)));
     } else {
         if (HAS_MEDIA) {
             // The optical depth of the way through the medium since t_min.
@@ -116,7 +116,7 @@ void path_advance(inout Path path, Hit hit) {
             }
         }
         if (!surface_hit) {
-            add_constant_light(path);
+            add_sky(path);
             path.alive = false;
             path.shadow = false;
             return;
@@ -130,6 +130,9 @@ void path_advance(inout Path path, Hit hit) {
             path.t_min = t;
             path.last = hit.primitive;
             path.last_along_normal = hit.along_normal;
+            vec3 normal;
+            float largest;
+            surface_point(primitive, path, hit, path.anchor, normal, largest);
             path.tau_left = max(path.tau_left, 0.0);
             path.t_max = flight_end(path);
             return;

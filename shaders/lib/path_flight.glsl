@@ -9,7 +9,7 @@ const uint PIVOT_SET = 0x40000000u;
 
 struct FlightEnd {
     bool scatters;
-    float t;
+    float way;      // since t_min
     vec3 weight;    // of a path that scatters: albedo, transmittance and density of t together
 };
 
@@ -28,7 +28,7 @@ bool light_pivot(Light light, vec2 u, out vec3 pivot) {
 // one of two techniques: the free flight itself, or with the probability `equiangular` distances that are likely near a light.
 // The weight has the density of both (one-sample MIS).
 FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
-    FlightEnd end = FlightEnd(!surface && t_end < path.far_end, t_end, medium.albedo);
+    FlightEnd end = FlightEnd(!surface && t_end < path.far_end, t_end - path.t_min, medium.albedo);
     float sigma = HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x;
     float way = t_end - path.t_min;
     bool mixed = HAS_EQUIANGULAR && medium.equiangular > 0.0;
@@ -40,8 +40,10 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
     }
     vec3 weights = HAS_CHROMATIC ? channel_weights(path.throughput) : vec3(0.0);
     if (!mixed) {
+        // Not the difference of two distances, which are rounded.
+        end.way = free_flight(path.tau_left, sigma);
         if (HAS_CHROMATIC) {
-            end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * way, medium.sigma_t, medium.albedo);
+            end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * end.way, medium.sigma_t, medium.albedo);
         }
         return end;
     }
@@ -59,7 +61,7 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
         s = min(free_flight(minus_log_1m_small((u - share) / (1.0 - share) * scatters), sigma), way);
     }
     float density = share > 0.0 ? equiangular_pdf(stretch, s) : 0.0;
-    end.t = path.t_min + s;
+    end.way = s;
     if (HAS_CHROMATIC) {
         vec3 collision = medium.sigma_t * exp_minus(path.tau_rgb + medium.sigma_t * s);
         vec3 ends = exp_minus(path.tau_rgb) * one_minus_exp_minus(medium.sigma_t * way);
@@ -93,13 +95,15 @@ vec3 keep_on_side(Primitive primitive, vec3 point, float side) {
     return missing > 0.0 && missing < 64.0 * vertex_clearance(largest) ? point + normal * (side * missing) : point;
 }
 
-// The point of a flight at t, on the right side of the surface behind it (`hit`) or before it (`path.last`).
-vec3 flight_point(Path path, Hit hit, float t) {
-    vec3 point = path.origin + path.direction * t;
+// The end of a flight on the right side of the surface behind it (`hit`) or before it (`path.last`). It is found from the boundary
+// through which the ray came, so that what the ray's distances lose to rounding on a long way does not matter.
+vec3 flight_point(Path path, Hit hit, float way) {
+    float t = path.t_min + way;
+    vec3 point = path.last != NONE ? path.anchor + path.direction * way : path.origin + path.direction * t;
     float close = near_distance(path, t);
     if (hit.primitive != NONE && hit.t - t < close) {
         point = keep_on_side(PRIMITIVE(hit.primitive), point, hit.along_normal ? -1.0 : 1.0);
-    } else if (path.last != NONE && t - path.t_min < close) {
+    } else if (path.last != NONE && way < close) {
         point = keep_on_side(PRIMITIVE(path.last), point, path.last_along_normal ? 1.0 : -1.0);
     }
     return point;

@@ -3,6 +3,7 @@
 #include "lib/path_state.glsl"
 #include "lib/path_vertex.glsl"
 #include "lib/light.glsl"
+#include "lib/sky.glsl"
 
 // Weight of a direction found by scattering that light sampling finds with density light_pdf: the balance heuristic (Veach and
 // Guibas 1995). Scattering finds the light only if the flight survives, so its probability to do so is part of the density.
@@ -15,18 +16,38 @@ bool emitters_seen(Path path) {
     return !(HAS_HIDDEN_EMITTERS && path.depth == 0u);
 }
 
-// Adds the constant light to a path that leaves the scene.
-void add_constant_light(inout Path path) {
-    if (!HAS_CONSTANT_LIGHT || !emitters_seen(path)) {
+bool is_envmap(Light light) {
+    return HAS_ENVMAPS && (light.kind & ((1u << LIGHT_TEXTURE_SHIFT) - 1u)) == LIGHT_ENVMAP;
+}
+
+// A direction in the axes of an environment map, and back.
+vec3 to_envmap(Light light, vec3 direction) {
+    return vec3(dot(light.edge_1, direction), dot(light.edge_2, direction), dot(light.normal, direction));
+}
+
+vec3 from_envmap(Light light, vec3 direction) {
+    return normalize(light.edge_1 * direction.x + light.edge_2 * direction.y + light.normal * direction.z);
+}
+
+// Adds what comes from all directions of the sky to a path that leaves the scene.
+void add_sky(inout Path path) {
+    if (!(HAS_CONSTANT_LIGHT || HAS_ENVMAPS) || !emitters_seen(path)) {
         return;
     }
-    for (uint i = 0u; i < params.light_count; ++i) {
+    [[dont_unroll]] for (uint i = params.first_sky; i < params.light_count; ++i) {
         Light light = LIGHT(i);
-        if (light.kind == LIGHT_CONSTANT) {
-            // Light sampling takes its directions from the same scattering function (see sample_light).
-            float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * path.pdf : 0.0;
-            path.radiance += survived_throughput(path) * light.radiance * scattering_mis_weight(path, survival(path), light_pdf);
+        vec3 radiance = light.radiance;
+        // Light sampling takes the constant light's directions from the same scattering function (see sample_light).
+        float pdf = path.pdf;
+        if (is_envmap(light)) {
+            Texture sky = TEXTURE(light.kind >> LIGHT_TEXTURE_SHIFT);
+            vec3 direction = to_envmap(light, path.direction);
+            vec2 uv = sky_uv(direction);
+            radiance = sky_radiance(sky, uv);
+            pdf = sky_pdf(sky, uv.x, direction.y);
         }
+        float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * pdf : 0.0;
+        path.radiance += survived_throughput(path) * radiance * scattering_mis_weight(path, survival(path), light_pdf);
     }
 }
 
@@ -44,8 +65,8 @@ void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
     path.radiance += survived_throughput(path) * light.radiance * scattering_mis_weight(path, survival(path), light_pdf);
 }
 
-// Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.
-bool sample_light(inout Path path, Vertex vertex, vec2 u, float lobe) {
+// Chooses a light and a point on it by u, and where a sampler has more to decide, by `decision`, and sets up the shadow ray. Returns whether there is anything to ask for.
+bool sample_light(inout Path path, Vertex vertex, vec2 u, vec2 decision) {
     if (!HAS_LIGHT_SAMPLING) {
         return false;
     }
@@ -55,11 +76,18 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u, float lobe) {
     if (HAS_CONSTANT_LIGHT && light.kind == LIGHT_CONSTANT) {
         // No direction is better than another, so the scattering function samples them; what light sampling adds is the
         // transmittance, exact instead of 0 or 1.
-        BsdfSample scattered = sample_scattering(vertex, u, lobe);
+        BsdfSample scattered = sample_scattering(vertex, u, decision.x);
         vec3 weight = scattered.pdf > 0.0 ? light.radiance / scattered.pdf : vec3(0.0);
         found = LightSample(scattered.direction, INFINITE_DISTANCE, weight, scattered.pdf);
     } else if (HAS_POINT_LIGHTS && light.kind == LIGHT_POINT) {
         found = sample_point_light(light, vertex.point);
+    } else if (HAS_SPOT_LIGHTS && light.kind == LIGHT_SPOT) {
+        found = sample_spot_light(light, vertex.point);
+    } else if (HAS_DIRECTIONAL_LIGHTS && light.kind == LIGHT_DIRECTIONAL) {
+        found = sample_directional_light(light);
+    } else if (is_envmap(light)) {
+        SkySample sky = sample_sky(TEXTURE(light.kind >> LIGHT_TEXTURE_SHIFT), u, decision);
+        found = LightSample(from_envmap(light, sky.direction), INFINITE_DISTANCE, sky.radiance / sky.pdf, sky.pdf);
     } else if (HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE) {
         found = sample_sphere_light(light, vertex.point, u);
     } else {

@@ -16,7 +16,8 @@ struct Path {
     float t_min;            // where the ray begins, or the last boundary on it
     float t_max;            // how far the free flight may get, or the distance to the light
     uint last;              // the boundary at t_min, or NONE
-    bool last_along_normal; // the ray went along its normal; only valid if last is not NONE
+    bool last_along_normal; // the ray went along its normal; this and the next only valid if last is not NONE
+    vec3 anchor;            // the point of the boundary that the ray went through
     bool shadow;
     // The path.
     vec3 throughput;

@@ -21,6 +21,10 @@ void main() {
     float pdf = 0.0;
     if (light.kind == LIGHT_POINT) {
         found = sample_point_light(light, point);
+    } else if (light.kind == LIGHT_SPOT) {
+        found = sample_spot_light(light, point);
+    } else if (light.kind == LIGHT_DIRECTIONAL) {
+        found = sample_directional_light(light);
     } else if (light.kind == LIGHT_SPHERE) {
         found = sample_sphere_light(light, point, u);
         pdf = sphere_light_pdf(light.edge_1.x, distance(point, light.origin));

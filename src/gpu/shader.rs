@@ -40,6 +40,7 @@ sources! {
     "lib/ray.glsl",
     "lib/rng.glsl",
     "lib/sampler.glsl",
+    "lib/sky.glsl",
     "lib/warp.glsl",
     "units/bsdf.comp",
     "units/bvh.comp",
@@ -53,6 +54,7 @@ sources! {
     "units/ray.comp",
     "units/rng.comp",
     "units/sampler.comp",
+    "units/sky.comp",
     "units/warp.comp",
 }
 

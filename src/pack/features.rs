@@ -25,8 +25,14 @@ pub struct Features {
     pub sphere_lights: bool,
     /// A point that emits.
     pub point_lights: bool,
-    /// Radiance from infinitely far.
+    /// The same radiance from infinitely far, in all directions.
     pub constant_light: bool,
+    /// A point that shines into a cone.
+    pub spot_lights: bool,
+    /// Parallel light.
+    pub directional_lights: bool,
+    /// Radiance from infinitely far, from an image.
+    pub envmaps: bool,
     /// More than one light to choose from.
     pub many_lights: bool,
     /// A surface whose back is black.
@@ -59,12 +65,11 @@ impl Features {
     pub fn of(scene: &Scene, packed: &Packed) -> Features {
         let Integrator { max_depth, rr_depth, hide_emitters } = scene.integrator;
         let media = packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
-        let kind = |kind: u32| packed.lights.iter().any(|light| light.kind == kind);
+        let lowest = (1 << LIGHT_TEXTURE_SHIFT) - 1;
+        let kind = |kind: u32| packed.lights.iter().any(|light| light.kind & lowest == kind);
         let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
         let area_lights = kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD) || kind(LIGHT_SPHERE);
         let max_depth = max_depth.unwrap_or(u32::MAX);
-        // Where the only light is the surroundings and nothing absorbs on the way, scattered rays find it just as well.
-        let light_sampling = max_depth > 1 && (area_lights || kind(LIGHT_POINT) || (kind(LIGHT_CONSTANT) && media));
         Features {
             media,
             chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x)),
@@ -76,6 +81,9 @@ impl Features {
             sphere_lights: kind(LIGHT_SPHERE),
             point_lights: kind(LIGHT_POINT),
             constant_light: kind(LIGHT_CONSTANT),
+            spot_lights: kind(LIGHT_SPOT),
+            directional_lights: kind(LIGHT_DIRECTIONAL),
+            envmaps: kind(LIGHT_ENVMAP),
             many_lights: packed.lights.len() > 1,
             one_sided: packed.surfaces.iter().any(|surface| surface.flags & SURFACE_TWO_SIDED == 0),
             dielectric: bsdf(BSDF_DIELECTRIC),
@@ -86,7 +94,9 @@ impl Features {
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
             },
             hide_emitters,
-            light_sampling,
+            // Where the only light is a constant sky and nothing absorbs on the way, scattered rays find it just as well.
+            light_sampling: max_depth > 1
+                && (packed.lights.iter().any(|light| light.kind != LIGHT_CONSTANT) || (kind(LIGHT_CONSTANT) && media)),
             mis: true,
             max_depth,
             rr_depth,
@@ -107,6 +117,9 @@ impl Features {
             sphere_lights: true,
             point_lights: true,
             constant_light: true,
+            spot_lights: true,
+            directional_lights: true,
+            envmaps: true,
             many_lights: true,
             one_sided: true,
             dielectric: true,
@@ -130,6 +143,9 @@ impl Features {
             ("HAS_SPHERE_LIGHTS", self.sphere_lights),
             ("HAS_POINT_LIGHTS", self.point_lights),
             ("HAS_CONSTANT_LIGHT", self.constant_light),
+            ("HAS_SPOT_LIGHTS", self.spot_lights),
+            ("HAS_DIRECTIONAL_LIGHTS", self.directional_lights),
+            ("HAS_ENVMAPS", self.envmaps),
             ("HAS_MANY_LIGHTS", self.many_lights),
             ("HAS_ONE_SIDED", self.one_sided),
             ("HAS_DIELECTRIC", self.dielectric),

@@ -1,7 +1,7 @@
 //! How distances are sampled in each medium.
 
 use super::frame::{Bounds, Frame};
-use super::layout::{LIGHT_CONSTANT, Light, Medium};
+use super::layout::{LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, Light, Medium};
 use super::nesting::Nesting;
 use crate::scene::{MediumId, Scene};
 
@@ -13,7 +13,8 @@ const THIN: f64 = 3.0;
 /// Switches equiangular sampling on for media that light from somewhere shines through. Behind glass it never arrives directly,
 /// and in an opaque medium only the first few free paths matter, which free flights sample well.
 pub fn choose_equiangular(scene: &Scene, nesting: &Nesting, frame: &Frame, lights: &[Light], media: &mut [Medium]) {
-    let local = lights.iter().any(|light| light.kind != LIGHT_CONSTANT);
+    let local =
+        lights.iter().any(|light| ![LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP].contains(&(light.kind & 0xff)));
     if !local || scene.integrator.max_depth.is_some_and(|depth| depth < 2) {
         return;
     }

@@ -20,7 +20,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The frame of a scene. Without any shape the camera and the point lights span it.
+    /// The frame of a scene. Without any shape the camera, the point lights and the spots span it.
     pub fn of(scene: &Scene) -> Frame {
         let mut bounds = Bounds::EMPTY;
         for shape in &scene.shapes {
@@ -29,7 +29,7 @@ impl Frame {
         if bounds.is_empty() {
             bounds.grow(scene.camera.to_world.w_axis.truncate());
             for light in &scene.lights {
-                if let Light::Point { position, .. } = light {
+                if let Light::Point { position, .. } | Light::Spot { position, .. } = light {
                     bounds.grow(*position);
                 }
             }

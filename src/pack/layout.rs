@@ -222,7 +222,8 @@ gpu_struct! {
         kind: u32,
         /// v of the look-up is `row_v · (u, v, 1)`.
         row_v: Vec3,
-        /// Bits of filter and wrap mode.
+        /// Bits of filter and wrap mode; of an environment map, the binary logarithms of the columns (low 8 bits) and rows of
+        /// the grid of its distribution.
         flags: u32,
         /// Of a checkerboard: the colour at (0, 0).
         color_0: Vec3,
@@ -246,23 +247,26 @@ gpu_struct! {
 gpu_struct! {
     /// A light, with its line of the alias table by which lights are chosen.
     pub struct Light {
-        /// A corner; the position of a point; the centre of a sphere.
+        /// A corner; the position of a point or spot; the centre of a sphere.
         origin: Vec3,
-        /// One of the `LIGHT_` constants.
+        /// One of the `LIGHT_` constants; of an environment map, its texture above [`LIGHT_TEXTURE_SHIFT`].
         kind: u32,
-        /// First edge, from the corner; (radius, 0, 0) of a sphere.
+        /// First edge, from the corner; (radius, side, 0) of a sphere; (cutoff, beam width, 1/their difference) of a spot, in
+        /// radians; the first axis of an environment map.
         edge_1: Vec3,
         /// Probability to choose this light.
         probability: f32,
-        /// Second edge, from the corner.
+        /// Second edge, from the corner; the second axis of an environment map.
         edge_2: Vec3,
         /// Area, canonical units²; 0 where it has no meaning.
         area: f32,
-        /// Emitted radiance; the intensity of a point.
+        /// Emitted radiance; the intensity of a point or spot; the irradiance of a directional light; the mean radiance of an
+        /// environment map.
         radiance: Vec3,
         /// Alias table: the light of this line is taken if the rescaled number is below.
         alias_threshold: f32,
-        /// Unit normal of the emitting side.
+        /// Unit normal of the emitting side; where the light of a spot or directional light goes; the third axis of an
+        /// environment map.
         normal: Vec3,
         /// Alias table: the light that is taken otherwise.
         alias: u32,
@@ -314,8 +318,8 @@ gpu_struct! {
         film_width: u32,
         /// Extinction coefficient outside of all boundaries.
         world_sigma_t: Vec3,
-        /// Fills the sixteen bytes.
-        unused: u32,
+        /// Index of the first light that shines from all directions; these come last in the table.
+        first_sky: u32,
     }
 }
 
@@ -375,6 +379,16 @@ pub const LIGHT_SPHERE: u32 = 2;
 pub const LIGHT_POINT: u32 = 3;
 /// [`Light::kind`]: the same radiance from every direction.
 pub const LIGHT_CONSTANT: u32 = 4;
+/// [`Light::kind`]: a point that shines into a cone.
+pub const LIGHT_SPOT: u32 = 5;
+/// [`Light::kind`]: parallel light from infinitely far.
+pub const LIGHT_DIRECTIONAL: u32 = 6;
+/// [`Light::kind`], low 8 bits: radiance from infinitely far, from an image.
+pub const LIGHT_ENVMAP: u32 = 7;
+/// Where the index of an environment map's texture begins in [`Light::kind`].
+pub const LIGHT_TEXTURE_SHIFT: u32 = 8;
+/// [`Texture::kind`]: an environment map, which only a light refers to.
+pub const TEXTURE_SKY: u32 = 255;
 /// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
 pub const TILE: u32 = 8;
 /// Longest distance; rays that end nowhere end here.
@@ -412,6 +426,10 @@ pub fn glsl() -> String {
         ("LIGHT_SPHERE", LIGHT_SPHERE),
         ("LIGHT_POINT", LIGHT_POINT),
         ("LIGHT_CONSTANT", LIGHT_CONSTANT),
+        ("LIGHT_SPOT", LIGHT_SPOT),
+        ("LIGHT_DIRECTIONAL", LIGHT_DIRECTIONAL),
+        ("LIGHT_ENVMAP", LIGHT_ENVMAP),
+        ("LIGHT_TEXTURE_SHIFT", LIGHT_TEXTURE_SHIFT),
         ("TILE", TILE),
         ("BLOCK_SAMPLES", crate::render::BLOCK_SAMPLES),
         ("POINT_BITS", sobol::POINT_BITS),

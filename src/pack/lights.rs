@@ -1,9 +1,12 @@
 //! The table of lights and the alias table by which one is chosen in constant time (Walker 1977, Vose 1991).
 
 use super::frame::Frame;
-use super::layout::{LIGHT_CONSTANT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_TRIANGLE, Light};
+use super::layout::{
+    LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_SPOT,
+    LIGHT_TEXTURE_SHIFT, LIGHT_TRIANGLE, Light,
+};
 use crate::scene;
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use std::f64::consts::PI;
 
 /// Share of the choice that is uniform over the lights. The rest goes by power, which says little about what arrives.
@@ -60,8 +63,8 @@ impl LightTable {
         self.push(light, mean(radiance) * area * PI)
     }
 
-    /// Adds a light without a surface.
-    pub fn add(&mut self, light: &scene::Light, frame: &Frame) {
+    /// Adds a light that shines from one place or one direction; those of the whole sky are left out.
+    pub fn add_place(&mut self, light: &scene::Light, frame: &Frame) {
         match light {
             scene::Light::Point { position, intensity } => {
                 // Intensity over distance² is irradiance: it scales as an area.
@@ -74,14 +77,62 @@ impl LightTable {
                 };
                 self.push(light, mean(scaled) * 4.0 * PI);
             }
-            scene::Light::Constant { radiance } => {
-                let light = Light { kind: LIGHT_CONSTANT, radiance: radiance.as_vec3(), ..Light::default() };
-                // Through the disc of a sphere about the scene, from all directions.
-                self.push(light, mean(*radiance) * 4.0 * PI * PI * frame.radius.max(0.5).powi(2));
+            scene::Light::Spot { position, direction, intensity, cutoff_angle, beam_width } => {
+                let scaled = *intensity * frame.scale.powi(2);
+                let [cutoff, beam] = [cutoff_angle, beam_width].map(|angle| angle.to_radians() as f32);
+                let slope = if cutoff > beam { 1.0 / (cutoff - beam) } else { 0.0 };
+                let light = Light {
+                    origin: frame.point(*position),
+                    kind: LIGHT_SPOT,
+                    edge_1: Vec3::new(cutoff, beam, slope),
+                    radiance: scaled.as_vec3(),
+                    normal: direction.as_vec3(),
+                    ..Light::default()
+                };
+                self.push(light, mean(scaled) * spot_solid_angle(f64::from(cutoff), f64::from(beam)));
             }
-            // `support` has refused these.
-            scene::Light::Spot { .. } | scene::Light::Directional { .. } | scene::Light::Envmap { .. } => {}
+            scene::Light::Directional { direction, irradiance } => {
+                // Irradiance has the unit of radiance, but for the solid angle: the unit of length does not change it.
+                let light = Light {
+                    kind: LIGHT_DIRECTIONAL,
+                    radiance: irradiance.as_vec3(),
+                    normal: direction.as_vec3(),
+                    ..Light::default()
+                };
+                self.push(light, mean(*irradiance) * disc_area(frame));
+            }
+            scene::Light::Constant { .. } | scene::Light::Envmap { .. } => {}
         }
+    }
+
+    /// Adds the same radiance from all directions.
+    pub fn add_constant(&mut self, radiance: DVec3, frame: &Frame) {
+        let light = Light { kind: LIGHT_CONSTANT, radiance: radiance.as_vec3(), ..Light::default() };
+        self.push(light, mean(radiance) * 4.0 * PI * disc_area(frame));
+    }
+
+    /// Adds an environment map with the mean radiance over all directions, the index of its texture, and the rotation from its
+    /// axes to the world's.
+    pub fn add_envmap(&mut self, mean_radiance: f64, texture: u32, to_world: &DMat3, frame: &Frame) {
+        let light = Light {
+            kind: LIGHT_ENVMAP | texture << LIGHT_TEXTURE_SHIFT,
+            radiance: Vec3::splat(mean_radiance as f32),
+            edge_1: to_world.x_axis.as_vec3(),
+            edge_2: to_world.y_axis.as_vec3(),
+            normal: to_world.z_axis.as_vec3(),
+            ..Light::default()
+        };
+        self.push(light, mean_radiance * 4.0 * PI * disc_area(frame));
+    }
+
+    /// Lights so far.
+    pub fn len(&self) -> u32 {
+        self.lights.len() as u32
+    }
+
+    /// Whether there is none so far.
+    pub fn is_empty(&self) -> bool {
+        self.lights.is_empty()
     }
 
     fn push(&mut self, light: Light, power: f64) -> u32 {
@@ -108,6 +159,18 @@ impl LightTable {
         }
         self.lights
     }
+}
+
+/// Cross section of a sphere about the scene: what parallel light passes through.
+fn disc_area(frame: &Frame) -> f64 {
+    PI * frame.radius.max(0.5).powi(2)
+}
+
+/// Power of a spot over the intensity on its axis. With the cutoff c and the beam width b in radians,
+///   2π ∫ falloff(θ) sin θ dθ = 2π (1 − cos b + ∫_b^c (c − θ)/(c − b) sin θ dθ) = 2π (1 − (sin c − sin b)/(c − b)).
+fn spot_solid_angle(cutoff: f64, beam: f64) -> f64 {
+    let mean_cosine = if cutoff > beam { (cutoff.sin() - beam.sin()) / (cutoff - beam) } else { cutoff.cos() };
+    2.0 * PI * (1.0 - mean_cosine)
 }
 
 fn mean(value: DVec3) -> f64 {

@@ -11,6 +11,7 @@ pub mod layout;
 pub mod lights;
 pub mod material;
 pub mod nesting;
+pub mod sky;
 pub mod sobol;
 mod support;
 
@@ -71,6 +72,17 @@ pub enum PackError {
         /// Its value.
         value: f64,
     },
+    /// More pixels and other numbers than 32 bits can count.
+    #[error("pixels and tables of {0} numbers are more than the {max} that a scene can hold", max = u32::MAX)]
+    TooManyValues(usize),
+    /// An environment map that single precision cannot hold.
+    #[error("the largest radiance of \"{name}\" is {value:e}, more than single precision can hold")]
+    TooBright {
+        /// Which emitter.
+        name: String,
+        /// The largest value, times the scale.
+        value: f64,
+    },
     /// Part of a scene that kernels cannot render yet.
     #[error("{what} of \"{name}\" cannot be rendered yet")]
     Unsupported {
@@ -105,9 +117,8 @@ impl Packed {
         if primitives.len() > bvh::MAX_PRIMITIVES {
             return Err(PackError::TooManyPrimitives(primitives.len()));
         }
-        for light in &scene.lights {
-            lights.add(light, &frame);
-        }
+        let (mut textures, mut values) = (Vec::new(), Vec::new());
+        let first_sky = pack_lights(scene, &frame, &mut lights, &mut textures, &mut values)?;
         let (bvh, primitives) = Bvh::new(&primitives);
         let lights = lights.finish();
         flight::choose_equiangular(scene, &nesting, &frame, &lights, &mut media);
@@ -119,13 +130,14 @@ impl Packed {
             grid_step: bvh.grid_step,
             light_count: lights.len() as u32,
             medium_count: media.len() as u32,
+            first_sky,
             world_sigma_t: media[medium_index(nesting.world) as usize].sigma_t,
             film_width: scene.film.width,
             ..params
         };
         let warnings = [nesting.warnings, simplified].concat();
         let features = EMPTY_FEATURES;
-        let (phases, corners, textures, values) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (phases, corners) = (Vec::new(), Vec::new());
         let mut packed = Packed {
             frame,
             bvh,
@@ -163,6 +175,9 @@ const EMPTY_FEATURES: Features = Features {
     sphere_lights: false,
     point_lights: false,
     constant_light: false,
+    spot_lights: false,
+    directional_lights: false,
+    envmaps: false,
     many_lights: false,
     one_sided: false,
     dielectric: false,
@@ -265,6 +280,43 @@ fn pack_shape(
             });
         }
     }
+}
+
+/// Adds the lights without a surface: first those that shine from one place or direction, then those of the whole sky. Returns the
+/// index of the first of the latter.
+fn pack_lights(
+    scene: &Scene,
+    frame: &Frame,
+    lights: &mut LightTable,
+    textures: &mut Vec<Texture>,
+    values: &mut Vec<f32>,
+) -> Result<u32, PackError> {
+    // A light that is black has nothing to be found, and would be chosen in vain.
+    let shining = || scene.lights.iter().enumerate().filter(|(_, light)| light.shines());
+    for (_, light) in shining() {
+        lights.add_place(light, frame);
+    }
+    let first_sky = lights.len();
+    for (index, light) in shining() {
+        match light {
+            scene::Light::Constant { radiance } => lights.add_constant(*radiance, frame),
+            scene::Light::Envmap { bitmap, scale, to_world } => {
+                let value = sky::largest(bitmap, *scale);
+                if value > f64::from(f32::MAX) {
+                    return Err(PackError::TooBright { name: format!("emitter {}", index + 1), value });
+                }
+                let count = values.len() + sky::value_count(bitmap);
+                if count > u32::MAX as usize {
+                    return Err(PackError::TooManyValues(count));
+                }
+                let packed = sky::pack(bitmap, *scale, values);
+                lights.add_envmap(packed.mean, textures.len() as u32, to_world, frame);
+                textures.push(packed.texture);
+            }
+            _ => {}
+        }
+    }
+    Ok(first_sky)
 }
 
 /// The camera's part of the parameters.

@@ -2,7 +2,7 @@
 //! kernels something takes its line out here.
 
 use super::PackError;
-use crate::scene::{Bsdf, Geometry, Light, Phase, Scene, Shape, Texture};
+use crate::scene::{Bsdf, Geometry, Phase, Scene, Shape, Texture};
 use glam::DVec3;
 
 /// Refuses the first thing that cannot be rendered; returns what is rendered in a simpler way, for people.
@@ -21,15 +21,6 @@ pub fn check(scene: &Scene) -> Result<Vec<String>, PackError> {
         if medium.emission != DVec3::ZERO {
             return unsupported("the emission", medium.name.clone());
         }
-    }
-    for (index, light) in scene.lights.iter().enumerate() {
-        let what = match light {
-            Light::Point { .. } | Light::Constant { .. } => continue,
-            Light::Spot { .. } => "the spot",
-            Light::Directional { .. } => "the directional light",
-            Light::Envmap { .. } => "the environment map",
-        };
-        return unsupported(what, format!("emitter {}", index + 1));
     }
     let mut warnings = Vec::new();
     for shape in &scene.shapes {

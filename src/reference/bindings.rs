@@ -117,6 +117,7 @@ pub struct Params {
     pub crop_height: u32,
     pub world_sigma_t: DVec3,
     pub film_width: u32,
+    pub first_sky: u32,
 }
 
 impl Tables {
@@ -237,6 +238,7 @@ impl From<&layout::Params> for Params {
             crop_height: from.crop_height,
             world_sigma_t: from.world_sigma_t.as_dvec3(),
             film_width: from.film_width,
+            first_sky: from.first_sky,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Mirror of `shaders/lib/equiangular.glsl`: distances at which a light near a ray is seen under equally likely angles (Kulla
 //! and Fajardo 2012).
 
-use super::math::arctangent;
+use super::math::arctan2;
 use glam::DVec3;
 
 /// A stretch of a ray, seen from a point.
@@ -28,7 +28,7 @@ pub fn stretch_seen_from(point: DVec3, origin: DVec3, direction: DVec3, t_begin:
     let begin = offset.dot(direction);
     let distance = (offset - direction * begin).length().max(MIN_EQUIANGULAR_DISTANCE);
     let extent = (t_end - t_begin).min(MAX_EQUIANGULAR_LENGTH);
-    let angle = arctangent(distance * extent, distance * distance + begin * (begin + extent));
+    let angle = arctan2(distance * extent, distance * distance + begin * (begin + extent));
     Stretch { distance, begin, extent, angle }
 }
 

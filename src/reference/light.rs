@@ -1,9 +1,9 @@
 //! Mirror of `shaders/lib/light.glsl`: what lights send to a point, and the density with which they are sampled.
 
 use super::bindings::Light;
-use super::math::from_frame;
+use super::math::{arctan2, from_frame};
 use super::warp::{square_to_cone, square_to_cone_pdf, square_to_sphere, square_to_sphere_pdf};
-use crate::pack::layout::{LIGHT_CONSTANT, LIGHT_TRIANGLE};
+use crate::pack::layout::{INFINITE_DISTANCE, LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_TRIANGLE};
 use glam::{DVec2, DVec3};
 
 /// The largest number below 1 that the kernel knows.
@@ -16,9 +16,11 @@ pub struct LightSample {
     pub direction: DVec3,
     /// To the sampled point.
     pub distance: f64,
-    /// Radiance / density per solid angle; of a point: intensity / distance²; 0 if nothing arrives.
+    /// Radiance / density per solid angle; of a point: intensity / distance²; of parallel light:
+    /// irradiance; 0 if nothing arrives.
     pub weight: DVec3,
-    /// Per solid angle, without the choice of the light; 0 for a point, which no other technique finds.
+    /// Per solid angle, without the choice of the light; 0 for a point, a spot and
+    /// parallel light, which no other technique finds.
     pub pdf: f64,
 }
 
@@ -49,7 +51,7 @@ pub fn area_pdf(area: f64, distance: f64, cos_light: f64) -> f64 {
 
 /// Whether a light is at some place, not infinitely far.
 pub fn is_local(light: &Light) -> bool {
-    light.kind != LIGHT_CONSTANT
+    !matches!(light.kind & 0xff, LIGHT_CONSTANT | LIGHT_DIRECTIONAL | LIGHT_ENVMAP)
 }
 
 /// Coordinates along the two edges of a uniform point of a triangle or parallelogram.
@@ -125,4 +127,25 @@ pub fn sample_point_light(light: &Light, point: DVec3) -> LightSample {
     } else {
         LightSample::NOTHING
     }
+}
+
+/// Share of its intensity that a spot sends at an angle from its axis: all of it within the beam, then less by a straight line
+/// down to nothing at the cutoff.
+pub fn spot_falloff(light: &Light, angle: f64) -> f64 {
+    let (cutoff, beam) = (light.edge_1.x, light.edge_1.y);
+    if angle <= beam { 1.0 } else { (cutoff - angle).max(0.0) * light.edge_1.z }
+}
+
+/// The one direction to a spot.
+pub fn sample_spot_light(light: &Light, point: DVec3) -> LightSample {
+    let mut result = sample_point_light(light, point);
+    let away = -result.direction;
+    let angle = 2.0 * arctan2((away - light.normal).length(), (away + light.normal).length());
+    result.weight *= spot_falloff(light, angle);
+    result
+}
+
+/// The one direction from which parallel light comes; the weight is the irradiance.
+pub fn sample_directional_light(light: &Light) -> LightSample {
+    LightSample { direction: -light.normal, distance: f64::from(INFINITE_DISTANCE), weight: light.radiance, pdf: 0.0 }
 }

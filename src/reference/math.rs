@@ -22,14 +22,15 @@ pub fn one_minus_exp_minus_rgb(x: DVec3) -> DVec3 {
     DVec3::new(one_minus_exp_minus(x.x), one_minus_exp_minus(x.y), one_minus_exp_minus(x.z))
 }
 
-/// The angle of (x, y) for y ≥ 0, in \[0, π\]; π/2 for (0, 0).
-pub fn arctangent(y: f64, x: f64) -> f64 {
-    if x == 0.0 { std::f64::consts::FRAC_PI_2 } else { y.atan2(x) }
-}
-
 /// [`exp_minus`] of each component.
 pub fn exp_minus_rgb(x: DVec3) -> DVec3 {
     DVec3::new(exp_minus(x.x), exp_minus(x.y), exp_minus(x.z))
+}
+
+/// The angle of the point (x, y) from the x axis, in \[−π, π\]; 0 at the origin.
+pub fn arctan2(y: f64, x: f64) -> f64 {
+    // The kernel knows no difference between the zeros.
+    if x == 0.0 && y == 0.0 { 0.0 } else { (y + 0.0).atan2(x) }
 }
 
 /// Two unit vectors (tangent, bitangent) that make up a right-handed frame with the unit vector n: tangent × bitangent

@@ -23,6 +23,7 @@ pub mod phase;
 pub mod ray;
 pub mod rng;
 pub mod sampler;
+pub mod sky;
 pub mod warp;
 
 use crate::pack::Packed;

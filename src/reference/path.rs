@@ -7,7 +7,7 @@ use super::camera::camera_direction;
 use super::math::{exp_minus_rgb, max_component, to_frame};
 use super::medium::channel_weights;
 use super::path_flight::{end_flight, enter_medium, flight_point, near_distance};
-use super::path_lights::{add_constant_light, add_emission, sample_light};
+use super::path_lights::{add_emission, add_sky, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_set, survived_throughput};
@@ -58,7 +58,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
     path.shadow =
-        (vertex.in_medium || bsdf_has_density(&vertex.surface)) && sample_light(tables, path, vertex, u.xy(), u.z);
+        (vertex.in_medium || bsdf_has_density(&vertex.surface)) && sample_light(tables, path, vertex, u.xy(), u.zw());
     path.next_direction = next.direction;
     path.next_medium = medium_towards(tables, vertex, path.medium, next.direction);
     path.throughput *= next.weight;
@@ -97,7 +97,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
     let medium = *medium_at(tables, path.medium);
     let end = end_flight(tables, path, &medium, t, surface_hit);
     if end.scatters {
-        let point = flight_point(tables, path, hit, end.t);
+        let point = flight_point(tables, path, hit, end.way);
         path.offset = 0.0;
         path.normal = path.direction;
         let (axis, surface, incident) = (path.direction, Surface::default(), DVec3::ZERO);
@@ -109,7 +109,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         path.tau_left -= way * medium.sigma_t[path.channel as usize];
         path.tau_rgb += medium.sigma_t * way;
         if !surface_hit {
-            add_constant_light(tables, path);
+            add_sky(tables, path);
             path.alive = false;
             path.shadow = false;
             return;
@@ -124,6 +124,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
             path.t_min = t;
             path.last = hit.primitive;
             path.last_along_normal = hit.along_normal;
+            path.anchor = surface_point(primitive, path, hit).0;
             path.tau_left = path.tau_left.max(0.0);
             path.t_max = flight_end(tables, path);
             return;

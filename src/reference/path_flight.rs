@@ -18,8 +18,8 @@ const PIVOT_SET: u32 = 0x4000_0000;
 pub struct FlightEnd {
     /// In the medium; else at a surface, or nowhere.
     pub scatters: bool,
-    /// Distance.
-    pub t: f64,
+    /// Distance since `t_min`.
+    pub way: f64,
     /// Of a path that scatters: albedo, transmittance and density of `t` together.
     pub weight: DVec3,
 }
@@ -34,7 +34,8 @@ fn light_pivot(light: &Light, u: DVec2) -> Option<DVec3> {
 
 /// Where the flight ends on a ray that meets a surface at `t_end`, or nothing before `t_end`.
 pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, surface: bool) -> FlightEnd {
-    let mut end = FlightEnd { scatters: !surface && t_end < path.far_end, t: t_end, weight: medium.albedo };
+    let mut end =
+        FlightEnd { scatters: !surface && t_end < path.far_end, way: t_end - path.t_min, weight: medium.albedo };
     let sigma = medium.sigma_t[path.channel as usize];
     let length = t_end - path.t_min;
     let mixed = medium.equiangular > 0.0;
@@ -46,7 +47,8 @@ pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, sur
     }
     let weights = channel_weights(path.throughput);
     if !mixed {
-        end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * length, medium.sigma_t, medium.albedo);
+        end.way = free_flight(path.tau_left, sigma);
+        end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * end.way, medium.sigma_t, medium.albedo);
         return end;
     }
     let scatters = one_minus_exp_minus(sigma * length);
@@ -62,7 +64,7 @@ pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, sur
         free_flight(minus_log_1m((u - share) / (1.0 - share) * scatters), sigma).min(length)
     };
     let density = if share > 0.0 { equiangular_pdf(&stretch, s) } else { 0.0 };
-    end.t = path.t_min + s;
+    end.way = s;
     let collision = medium.sigma_t * exp_minus_rgb(path.tau_rgb + medium.sigma_t * s);
     let ends = exp_minus_rgb(path.tau_rgb) * one_minus_exp_minus_rgb(medium.sigma_t * length);
     let mixture = (1.0 - share) * weights.dot(collision) + share * weights.dot(ends) * density;
@@ -92,13 +94,15 @@ fn keep_on_side(primitive: &Primitive, point: DVec3, side: f64) -> DVec3 {
     if missing > 0.0 && missing < 64.0 * vertex_clearance(largest) { point + normal * (side * missing) } else { point }
 }
 
-/// The point of a flight at t, on the right side of the surface behind it (`hit`) or before it (`path.last`).
-pub fn flight_point(tables: &Tables, path: &Path, hit: &Hit, t: f64) -> DVec3 {
-    let point = path.origin + path.direction * t;
+/// The end of a flight on the right side of the surface behind it (`hit`) or before it (`path.last`).
+pub fn flight_point(tables: &Tables, path: &Path, hit: &Hit, way: f64) -> DVec3 {
+    let t = path.t_min + way;
+    let (start, distance) = if path.last == NONE { (path.origin, t) } else { (path.anchor, way) };
+    let point = start + path.direction * distance;
     let close = near_distance(path, t);
     if hit.primitive != NONE && hit.t - t < close {
         keep_on_side(tables.primitive(hit.primitive), point, if hit.along_normal { -1.0 } else { 1.0 })
-    } else if path.last != NONE && t - path.t_min < close {
+    } else if path.last != NONE && way < close {
         keep_on_side(tables.primitive(path.last), point, if path.last_along_normal { 1.0 } else { -1.0 })
     } else {
         point

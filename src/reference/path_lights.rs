@@ -3,12 +3,17 @@
 use super::bindings::{Light, Primitive, Tables};
 use super::bsdf::BsdfSample;
 use super::light::{
-    LightSample, area_pdf, sample_plane_light, sample_point_light, sample_sphere_light, sphere_light_pdf,
+    LightSample, area_pdf, sample_directional_light, sample_plane_light, sample_point_light, sample_sphere_light,
+    sample_spot_light, sphere_light_pdf,
 };
 use super::math::max_component;
 use super::path_state::{INFINITE_DISTANCE, Path, choose_light, survival, survived_throughput};
 use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
-use crate::pack::layout::{LIGHT_CONSTANT, LIGHT_POINT, LIGHT_SPHERE};
+use super::sky::{SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
+use crate::pack::layout::{
+    LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_TEXTURE_SHIFT,
+    Texture,
+};
 use glam::{DVec2, DVec3};
 
 /// Weight of a direction found by scattering that light sampling finds with density `light_pdf`: the balance heuristic
@@ -23,16 +28,40 @@ pub fn emitters_seen(tables: &Tables, path: &Path) -> bool {
     !(tables.features.hide_emitters && path.depth == 0)
 }
 
-/// Adds the constant light to a path that leaves the scene.
-pub fn add_constant_light(tables: &Tables, path: &mut Path) {
+/// The texture of an environment map.
+pub fn envmap<'a>(tables: &'a Tables, light: &Light) -> Option<&'a Texture> {
+    let is_envmap = light.kind & ((1 << LIGHT_TEXTURE_SHIFT) - 1) == LIGHT_ENVMAP;
+    is_envmap.then(|| &tables.textures[(light.kind >> LIGHT_TEXTURE_SHIFT) as usize])
+}
+
+/// A direction in the axes of an environment map.
+pub fn to_envmap(light: &Light, direction: DVec3) -> DVec3 {
+    DVec3::new(light.edge_1.dot(direction), light.edge_2.dot(direction), light.normal.dot(direction))
+}
+
+/// A direction from the axes of an environment map.
+pub fn from_envmap(light: &Light, direction: DVec3) -> DVec3 {
+    (light.edge_1 * direction.x + light.edge_2 * direction.y + light.normal * direction.z).normalize()
+}
+
+/// Adds what comes from all directions of the sky to a path that leaves the scene.
+pub fn add_sky(tables: &Tables, path: &mut Path) {
     if !emitters_seen(tables, path) {
         return;
     }
-    for light in tables.lights.iter().filter(|light| light.kind == LIGHT_CONSTANT) {
-        // Light sampling takes its directions from the same scattering function (see `sample_light`).
-        let light_pdf = if tables.features.light_sampling { light.probability * path.pdf } else { 0.0 };
+    for light in &tables.lights[tables.params.first_sky as usize..] {
+        let (radiance, pdf) = match envmap(tables, light) {
+            Some(sky) => {
+                let direction = to_envmap(light, path.direction);
+                let uv = sky_uv(direction);
+                (sky_radiance(&tables.values, sky, uv), sky_pdf(&tables.values, sky, uv.x, direction.y))
+            }
+            // Light sampling takes the constant light's directions from the same scattering function (see `sample_light`).
+            None => (light.radiance, path.pdf),
+        };
+        let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
         let weight = scattering_mis_weight(tables, path, survival(path), light_pdf);
-        path.radiance += survived_throughput(path) * light.radiance * weight;
+        path.radiance += survived_throughput(path) * radiance * weight;
     }
 }
 
@@ -53,8 +82,8 @@ pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: 
     path.radiance += survived_throughput(path) * light.radiance * weight;
 }
 
-/// Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.
-pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2, lobe: f64) -> bool {
+/// Chooses a light and a point on it by `u`, and where a sampler has more to decide, by `decision`, and sets up the shadow ray. Returns whether there is anything to ask for.
+pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2, decision: DVec2) -> bool {
     if !tables.features.light_sampling {
         return false;
     }
@@ -64,13 +93,22 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
         LIGHT_CONSTANT => {
             // No direction is better than another, so the scattering function samples them; what light sampling adds is
             // the transmittance, exact instead of 0 or 1.
-            let BsdfSample { direction, pdf, .. } = sample_scattering(vertex, u, lobe);
+            let BsdfSample { direction, pdf, .. } = sample_scattering(vertex, u, decision.x);
             let weight = if pdf > 0.0 { light.radiance / pdf } else { DVec3::ZERO };
             LightSample { direction, distance: INFINITE_DISTANCE, weight, pdf }
         }
         LIGHT_POINT => sample_point_light(light, vertex.point),
+        LIGHT_SPOT => sample_spot_light(light, vertex.point),
+        LIGHT_DIRECTIONAL => sample_directional_light(light),
         LIGHT_SPHERE => sample_sphere_light(light, vertex.point, u),
-        _ => sample_plane_light(light, vertex.point, u),
+        _ => match envmap(tables, light) {
+            Some(sky) => {
+                let SkySample { direction, radiance, pdf } = sample_sky(&tables.values, sky, u, decision);
+                let direction = from_envmap(light, direction);
+                LightSample { direction, distance: INFINITE_DISTANCE, weight: radiance / pdf, pdf }
+            }
+            None => sample_plane_light(light, vertex.point, u),
+        },
     };
     let scattering = eval_scattering(vertex, found.direction);
     path.direction = found.direction;

@@ -35,6 +35,8 @@ pub struct Path {
     pub last: u32,
     /// The ray went along the normal of `last`.
     pub last_along_normal: bool,
+    /// The point of `last` that the ray went through.
+    pub anchor: DVec3,
     /// A shadow ray is asked for.
     pub shadow: bool,
     /// What the radiance at the path's end is multiplied with.

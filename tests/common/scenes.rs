@@ -1,8 +1,11 @@
 //! Tiny scenes, built in Rust.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3};
+use std::sync::Arc;
 use tyndall::pack::Packed;
-use tyndall::scene::{Bsdf, Camera, Film, Geometry, Light, Medium, Mesh, Phase, Scene, Shape};
+use tyndall::scene::{
+    Bitmap, Bsdf, Camera, Distribution, Film, Geometry, Light, Medium, Mesh, Phase, Roughness, Scene, Shape,
+};
 
 /// The tables of a scene.
 pub fn pack(scene: &Scene, seed: u32) -> Packed {
@@ -172,6 +175,78 @@ pub fn sphere_light() -> Scene {
     scene
 }
 
+/// An environment map: the value of each pixel (x, y).
+pub fn sky(width: usize, height: usize, pixel: impl Fn(usize, usize) -> DVec3) -> Arc<Bitmap> {
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let pixels = pixels.map(|(x, y)| pixel(x, y).as_vec3().to_array()).collect();
+    Arc::new(Bitmap::new(width, height, pixels).expect("the pixels are finite"))
+}
+
+/// A blue sky with a sun, brown below the horizon; not symmetric in any axis.
+pub fn sunny() -> Arc<Bitmap> {
+    sky(24, 13, |x, y| match (x, y) {
+        (5, 3) => v(400.0, 350.0, 250.0),
+        (_, 0..6) => v(0.2, 0.3, 0.6) * (1.0 + 0.04 * x as f64),
+        _ => v(0.1, 0.08, 0.05),
+    })
+}
+
+/// A floor, a ball of haze and a metal one.
+fn still_life(fog: bool) -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    let floor = quad(v(-3.0, -1.0, 3.0), DVec3::X * 6.0, DVec3::NEG_Z * 6.0);
+    scene.shapes.push(Shape::diffuse("floor", floor, v(0.5, 0.6, 0.7)));
+    let haze = scene.add_medium(gray(5.0, 0.9, 0.5));
+    scene.shapes.push(Shape::boundary("haze", ball(v(-0.6, -0.3, 0.0), 0.5), haze));
+    let mut metal = Shape::diffuse("metal", ball(v(0.6, -0.4, 0.3), 0.5), DVec3::ZERO);
+    metal.bsdf = Bsdf::RoughConductor {
+        eta: v(0.2, 0.9, 1.1),
+        k: v(3.9, 2.4, 2.1),
+        specular_reflectance: DVec3::ONE.into(),
+        roughness: Roughness { distribution: Distribution::Ggx, alpha_u: 0.3, alpha_v: 0.3 },
+        two_sided: true,
+    };
+    scene.shapes.push(metal);
+    if fog {
+        let thin = scene.add_medium(gray(0.1, 0.8, 0.0));
+        scene.shapes.push(Shape::boundary("fog", cuboid(DMat4::from_scale(v(3.5, 2.5, 3.5))), thin));
+    }
+    scene
+}
+
+/// A spot and parallel light, through fog that ends somewhere.
+pub fn spot_and_directional() -> Scene {
+    let mut scene = still_life(true);
+    let (position, direction) = (v(1.0, 1.5, 1.0), v(-0.8, -1.0, -0.7).normalize());
+    let intensity = v(8.0, 6.0, 5.0);
+    scene.lights.push(Light::Spot { position, direction, intensity, cutoff_angle: 35.0, beam_width: 20.0 });
+    scene.lights.push(Light::Directional { direction: v(0.5, -1.0, -0.3).normalize(), irradiance: v(0.5, 0.7, 1.0) });
+    scene
+}
+
+/// An environment map, turned.
+pub fn envmap() -> Scene {
+    let mut scene = still_life(false);
+    let to_world = DMat3::from_rotation_x(0.4) * DMat3::from_rotation_y(1.0);
+    scene.lights.push(Light::Envmap { bitmap: sunny(), scale: 0.8, to_world });
+    scene
+}
+
+/// Lights of every kind at once, some of them twice.
+pub fn all_lights() -> Scene {
+    let mut scene = spot_and_directional();
+    scene.shapes.push(Shape::lamp("ball", ball(v(-0.3, 0.9, -0.2), 0.1), v(4.0, 5.0, 6.0)));
+    scene.shapes.push(lamp());
+    scene.lights.push(Light::Envmap { bitmap: sunny(), scale: 0.3, to_world: DMat3::from_rotation_z(1.0) });
+    scene.lights.push(Light::Point { position: v(0.7, 0.6, 0.4), intensity: v(0.3, 0.2, 0.4) });
+    scene.lights.push(Light::Constant { radiance: v(0.05, 0.1, 0.2) });
+    // Mirrored, as a scene file can have it.
+    let to_world = DMat3::from_diagonal(v(-1.0, 1.0, 1.0));
+    let small = sky(2, 3, |x, y| v(0.1, 0.2, 0.3) * (x + 2 * y) as f64);
+    scene.lights.push(Light::Envmap { bitmap: small, scale: 1.0, to_world });
+    scene
+}
+
 /// All scenes of this file, by name.
 pub fn all() -> Vec<(&'static str, Scene)> {
     vec![
@@ -180,6 +255,9 @@ pub fn all() -> Vec<(&'static str, Scene)> {
         ("furnace", furnace(cuboid(DMat4::IDENTITY), 3.0, 0.5)),
         ("point light", point_light()),
         ("sphere light", sphere_light()),
+        ("spot and directional", spot_and_directional()),
+        ("environment map", envmap()),
+        ("all lights", all_lights()),
     ]
 }
 

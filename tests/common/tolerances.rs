@@ -7,6 +7,7 @@ use super::comparison::{Comparison, Tolerance};
 const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "minus_log_1m", relative: 3e-7, absolute: 0.0 },
     Tolerance { function: "exp_minus", relative: 3e-7, absolute: 2e-38 },
+    Tolerance { function: "arctan2", relative: 3e-7, absolute: 1e-37 },
     Tolerance { function: "orthonormal_frame", relative: 3e-7, absolute: 0.0 },
     Tolerance { function: "square_to_sphere", relative: 2e-6, absolute: 0.0 },
     Tolerance { function: "square_to_cosine_hemisphere", relative: 2e-6, absolute: 0.0 },
@@ -43,6 +44,11 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "sphere light distance", relative: 4e-4, absolute: 0.0 },
     Tolerance { function: "light weight", relative: 4e-6, absolute: 0.0 },
     Tolerance { function: "light pdf", relative: 4e-6, absolute: 0.0 },
+    Tolerance { function: "spot weight", relative: 0.0, absolute: 2e-5 },
+    Tolerance { function: "sky direction", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "sky coordinates", relative: 0.0, absolute: 3e-7 },
+    Tolerance { function: "sky radiance", relative: 2e-5, absolute: 0.0 },
+    Tolerance { function: "sky pdf", relative: 1e-7, absolute: 0.0 },
     Tolerance { function: "alias rescaled", relative: 0.0, absolute: 1e-5 },
     Tolerance { function: "camera_direction", relative: 3e-7, absolute: 0.0 },
 ];
