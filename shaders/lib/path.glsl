@@ -50,7 +50,7 @@ void scatter(inout Path path, Vertex vertex) {
         return;
     }
     vec4 u = sample_set(path, 2u * path.segment + 1u);
-    float lobe = HAS_LOBES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
+    float lobe = HAS_LOBES || HAS_PHASES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
     BsdfSample next = sample_scattering(vertex, u.zw, lobe);
     path.point = vertex.point;
     path.t_min = 0.0;
@@ -119,7 +119,7 @@ void path_advance(inout Path path, Hit hit) {
         path.offset = 0.0;
         path.normal = path.direction;
         Surface none;
-        scatter(path, Vertex(point, path.direction, true, medium.g, weight, none, vec3(0.0)));
+        scatter(path, Vertex(point, path.direction, true, medium.g, medium.phase, weight, none, vec3(0.0)));
     } else {
         Primitive primitive = PRIMITIVE(hit.primitive);
         Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
@@ -146,7 +146,7 @@ void path_advance(inout Path path, Hit hit) {
         vec3 axis = back && !(HAS_DIELECTRIC && (surface.flags & SURFACE_ORIENTED) != 0u) ? -normal : normal;
         path.offset = offset_distance(largest);
         path.normal = axis;
-        scatter(path, Vertex(point, axis, false, 0.0, vec3(0.0), surface, to_frame(axis, -path.direction)));
+        scatter(path, Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, to_frame(axis, -path.direction)));
     }
     if (!path.shadow && path.alive) {
         next_segment(path);

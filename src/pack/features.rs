@@ -13,6 +13,8 @@ pub struct Features {
     pub chromatic: bool,
     /// A phase function with g ≠ 0.
     pub henyey_greenstein: bool,
+    /// A medium with a mixture of phase functions.
+    pub phases: bool,
     /// A surface that rays cross without an event.
     pub boundaries: bool,
     /// Spheres among the primitives.
@@ -62,6 +64,7 @@ impl Features {
             media,
             chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x)),
             henyey_greenstein: packed.media.iter().any(|medium| medium.g != 0.0),
+            phases: packed.media.iter().any(|medium| medium.phase != 0),
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
             spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
             area_lights,
@@ -92,6 +95,7 @@ impl Features {
             media: true,
             chromatic: true,
             henyey_greenstein: true,
+            phases: true,
             boundaries: true,
             spheres: true,
             area_lights: true,
@@ -114,6 +118,7 @@ impl Features {
             ("HAS_MEDIA", self.media),
             ("HAS_CHROMATIC", self.chromatic),
             ("HAS_HENYEY_GREENSTEIN", self.henyey_greenstein),
+            ("HAS_PHASES", self.phases),
             ("HAS_BOUNDARIES", self.boundaries),
             ("HAS_SPHERES", self.spheres),
             ("HAS_AREA_LIGHTS", self.area_lights),

@@ -170,9 +170,10 @@ gpu_struct! {
         weight: f32,
         /// Mean cosine of Henyey and Greenstein's.
         g: f32,
-        /// Of a table: index of its first number among the values.
+        /// Of a table: index of its first number among the values. The densities come first, then as many numbers of the
+        /// distribution function.
         first_value: u32,
-        /// Of a table: numbers in it.
+        /// Of a table: densities in it, at cosines from -1 to 1 in equal steps.
         value_count: u32,
         /// Fills the sixteen bytes.
         unused_1: u32,
@@ -357,6 +358,12 @@ pub const BSDF_DIELECTRIC: u32 = 1;
 pub const BSDF_CONDUCTOR: u32 = 2;
 /// Kind of BSDF: a diffuse body under a smooth or rough varnish.
 pub const BSDF_PLASTIC: u32 = 3;
+/// [`Phase::kind`]: Henyey and Greenstein's.
+pub const PHASE_HENYEY_GREENSTEIN: u32 = 0;
+/// [`Phase::kind`]: Rayleigh's.
+pub const PHASE_RAYLEIGH: u32 = 1;
+/// [`Phase::kind`]: a table.
+pub const PHASE_TABULATED: u32 = 2;
 /// [`Light::kind`]: a triangle.
 pub const LIGHT_TRIANGLE: u32 = 0;
 /// [`Light::kind`]: a parallelogram.
@@ -399,6 +406,9 @@ pub fn glsl() -> String {
         ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),
         ("BSDF_CONDUCTOR", BSDF_CONDUCTOR),
         ("BSDF_PLASTIC", BSDF_PLASTIC),
+        ("PHASE_HENYEY_GREENSTEIN", PHASE_HENYEY_GREENSTEIN),
+        ("PHASE_RAYLEIGH", PHASE_RAYLEIGH),
+        ("PHASE_TABULATED", PHASE_TABULATED),
         ("LIGHT_TRIANGLE", LIGHT_TRIANGLE),
         ("LIGHT_QUAD", LIGHT_QUAD),
         ("LIGHT_SPHERE", LIGHT_SPHERE),

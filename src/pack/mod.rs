@@ -1,6 +1,6 @@
 //! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
 
-use crate::scene::{self, Bsdf, Geometry, MediumId, Scene, Shape};
+use crate::scene::{Bsdf, Geometry, MediumId, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
@@ -10,6 +10,7 @@ pub mod layout;
 pub mod lights;
 pub mod material;
 pub mod nesting;
+pub mod phase;
 pub mod sobol;
 mod support;
 
@@ -60,6 +61,17 @@ pub enum PackError {
     /// More media than a surface can name.
     #[error("{0} media are more than the {max} that a scene can hold", max = MAX_MEDIA)]
     TooManyMedia(usize),
+    /// More components than one mixture of phase functions can name.
+    #[error(
+        "the phase function of \"{name}\" blends {count} different ones, more than the {max} that a medium can have",
+        max = phase::MAX_COMPONENTS
+    )]
+    TooManyPhases {
+        /// Of which medium.
+        name: String,
+        /// Different components.
+        count: usize,
+    },
     /// A value that single precision cannot hold in the canonical frame.
     #[error("{what} of \"{name}\" is {value:e} per canonical unit, which single precision cannot hold")]
     OutOfRange {
@@ -92,7 +104,8 @@ impl Packed {
         if scene.media.len() > MAX_MEDIA {
             return Err(PackError::TooManyMedia(scene.media.len()));
         }
-        let media = pack_media(scene, &frame)?;
+        let (mut phases, mut values) = (Vec::new(), Vec::new());
+        let media = pack_media(scene, &frame, &mut phases, &mut values)?;
         let mut surfaces = Vec::with_capacity(scene.shapes.len());
         let mut primitives = Vec::new();
         let mut lights = LightTable::default();
@@ -123,7 +136,7 @@ impl Packed {
         };
         let warnings = [nesting.warnings, simplified].concat();
         let features = EMPTY_FEATURES;
-        let (phases, corners, textures, values) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (corners, textures) = (Vec::new(), Vec::new());
         let mut packed = Packed {
             frame,
             bvh,
@@ -154,6 +167,7 @@ const EMPTY_FEATURES: Features = Features {
     media: false,
     chromatic: false,
     henyey_greenstein: false,
+    phases: false,
     boundaries: false,
     spheres: false,
     area_lights: false,
@@ -178,7 +192,12 @@ fn medium_index(medium: Option<MediumId>) -> u32 {
     medium.map_or(0, |MediumId(index)| index + 1)
 }
 
-fn pack_media(scene: &Scene, frame: &Frame) -> Result<Vec<Medium>, PackError> {
+fn pack_media(
+    scene: &Scene,
+    frame: &Frame,
+    phases: &mut Vec<layout::Phase>,
+    values: &mut Vec<f32>,
+) -> Result<Vec<Medium>, PackError> {
     let mut media = vec![Medium::default()];
     for medium in &scene.media {
         let sigma_t = frame.per_length(medium.sigma_t);
@@ -186,20 +205,10 @@ fn pack_media(scene: &Scene, frame: &Frame) -> Result<Vec<Medium>, PackError> {
             let value = (medium.sigma_t / frame.scale).max_element();
             return Err(PackError::OutOfRange { what: "sigma_t", name: medium.name.clone(), value });
         }
-        let g = match medium.phase {
-            scene::Phase::HenyeyGreenstein { g } => nearest_below_one(g),
-            // `support` has refused all others.
-            _ => 0.0,
-        };
-        media.push(Medium { sigma_t, g, albedo: medium.albedo.as_vec3(), ..Medium::default() });
+        let (g, phase) = phase::pack(medium, phases, values)?;
+        media.push(Medium { sigma_t, g, phase, albedo: medium.albedo.as_vec3(), ..Medium::default() });
     }
     Ok(media)
-}
-
-/// `g` in single precision, kept inside of (−1, 1) where rounding would reach the end.
-fn nearest_below_one(g: f64) -> f32 {
-    let most = 1.0 - f32::EPSILON / 2.0;
-    (g as f32).clamp(-most, most)
 }
 
 fn pack_surface(shape: &Shape, exterior: Option<MediumId>, media: &[Medium]) -> Surface {

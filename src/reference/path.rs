@@ -1,7 +1,7 @@
 //! Mirror of `shaders/lib/path.glsl`: the estimator, a path as a coroutine that asks for one ray at a time. A path's
 //! life is described there. What the kernel leaves out where a scene does not need it is always here.
 
-use super::bindings::{Surface, Tables};
+use super::bindings::{Medium, Surface, Tables};
 use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
 use super::math::{exp_minus_rgb, max_component, to_frame};
@@ -51,7 +51,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     }
     let u = sample_set(tables, path, 2 * path.segment + 1);
     let lobe = sample_set(tables, path, 2 * path.segment + 2).y;
-    let next = sample_scattering(vertex, u.zw(), lobe);
+    let next = sample_scattering(tables, vertex, u.zw(), lobe);
     path.point = vertex.point;
     path.t_min = 0.0;
     path.last = NONE;
@@ -110,8 +110,8 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         path.offset = 0.0;
         path.normal = path.direction;
         let (surface, incident) = (Surface::default(), DVec3::ZERO);
-        let vertex =
-            Vertex { point, axis: path.direction, in_medium: true, g: medium.g, albedo: weight, surface, incident };
+        let (axis, Medium { g, phase, .. }) = (path.direction, medium);
+        let vertex = Vertex { point, axis, in_medium: true, g, phase, albedo: weight, surface, incident };
         scatter(tables, path, &vertex);
     } else {
         let primitive = tables.primitive(hit.primitive);
@@ -142,7 +142,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         scatter(
             tables,
             path,
-            &Vertex { point, axis, in_medium: false, g: 0.0, albedo: DVec3::ZERO, surface, incident },
+            &Vertex { point, axis, in_medium: false, g: 0.0, phase: 0, albedo: DVec3::ZERO, surface, incident },
         );
     }
     if !path.shadow && path.alive {

@@ -172,6 +172,27 @@ pub fn sphere_light() -> Scene {
     scene
 }
 
+/// Media with phase functions of all kinds, beside and in each other.
+pub fn mixed_phases() -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    walls(&mut scene);
+    scene.shapes.push(lamp());
+    let table = |values: &[f64]| Phase::tabulated(values.to_vec()).expect("a table");
+    let blend = |weight, a, b| Phase::Blend { weight, a: Box::new(a), b: Box::new(b) };
+    let inner = blend(0.3, Phase::HenyeyGreenstein { g: 0.6 }, table(&[2.0, 0.0, 1.0, 0.2, 0.0, 5.0]));
+    let three = blend(0.7, Phase::Rayleigh, inner);
+    let medium = |name, phase| Medium::new(name, v(2.0, 3.0, 5.0), v(0.9, 0.95, 0.8), phase);
+    let cases =
+        [("air", Phase::Rayleigh), ("cloud", table(&[1.0, 0.2, 0.0, 4.0])), ("blend", three), ("plain", phase(0.4))];
+    for (k, (name, phase)) in cases.into_iter().enumerate() {
+        let id = scene.add_medium(medium(name, phase));
+        let center = v(if k % 2 == 0 { -0.4 } else { 0.4 }, if k < 2 { -0.5 } else { 0.3 }, 0.1);
+        scene.shapes.push(Shape::boundary(name, ball(center, 0.35), id));
+    }
+    scene.lights.push(Light::Constant { radiance: v(0.2, 0.3, 0.4) });
+    scene
+}
+
 /// All scenes of this file, by name.
 pub fn all() -> Vec<(&'static str, Scene)> {
     vec![
@@ -180,6 +201,7 @@ pub fn all() -> Vec<(&'static str, Scene)> {
         ("furnace", furnace(cuboid(DMat4::IDENTITY), 3.0, 0.5)),
         ("point light", point_light()),
         ("sphere light", sphere_light()),
+        ("mixed phases", mixed_phases()),
     ]
 }
 
