@@ -249,8 +249,8 @@ fn free_flights_are_exponential() {
             .chunks(3)
             .flat_map(|depth| [[0.5, depth[0][0], sigma as f32, 0.0], [1.0; 4], [1.0; 4], [1.0; 4], [1.0; 4]])
             .collect();
-        let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], numbers.len(), 4 * numbers.len());
-        let distances: Vec<f64> = outputs.iter().step_by(4).map(|output| f64::from(output[1])).collect();
+        let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], numbers.len(), 5 * numbers.len());
+        let distances: Vec<f64> = outputs.iter().step_by(5).map(|output| f64::from(output[1])).collect();
         let ranks = |sigma: f64| distances.iter().map(move |t| 1.0 - (-sigma * t).exp()).collect::<Vec<_>>();
         check_uniform(ranks(sigma), 50).unwrap_or_else(|why| panic!("sigma_t = {sigma}: {why}"));
         check_uniform(ranks(sigma * 1.03), 50).expect_err("another extinction");

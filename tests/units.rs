@@ -142,13 +142,19 @@ fn media() {
         let sigma = if sigma[(3 - k % 3) % 3] == 0.0 { [1.0; 3] } else { sigma };
         let albedo = [random.unit(), random.unit(), 1.0];
         inputs.push(vec4(&[u, math::minus_log_1m(u), if k % 50 == 0 { 0.0 } else { depth }]));
-        inputs.extend([vec4(&throughput.to_array()), vec4(&tau), vec4(&sigma), vec4(&albedo)]);
+        let mut vectors = [vec4(&throughput.to_array()), vec4(&tau), vec4(&sigma), vec4(&albedo)];
+        // A share, a way that is short in the densest channel, whether the flight ended there, and a number.
+        let way = random.unit() * 3.0 / (1e-3 + sigma.into_iter().fold(0.0, f64::max));
+        let emission = [random.unit(), way, f64::from(k as u32 % 2), random.unit()];
+        vectors.iter_mut().zip(emission).for_each(|(vector, number)| vector[3] = number as f32);
+        inputs.extend(vectors);
     }
     let count = inputs.len() / 5;
-    let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], count, 4 * count);
+    let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], count, 5 * count);
     let names = ["channel_weights", "free_flight", "survival_probability", "survival_weight", "scatter_weight"];
     let [mut weights, mut flight, mut probability, mut survival, mut scatter] = names.map(comparison);
-    for (input, output) in inputs.chunks(5).zip(outputs.chunks(4)) {
+    let [mut emitting, mut emitting_rgb] = ["emitting_length", "emitting_length_rgb"].map(comparison);
+    for (input, output) in inputs.chunks(5).zip(outputs.chunks(5)) {
         let [u, tau_one, sigma_one, _] = input[0].map(f64::from);
         let [throughput, tau, sigma_t, albedo] = [1, 2, 3, 4].map(|k| widen(&input[k][..3]));
         let expected = medium::channel_weights(throughput);
@@ -161,9 +167,15 @@ fn media() {
         weights.vector(&case, &output[1][..3], expected);
         survival.vector(&case, &output[2][..3], medium::survival_weight(expected, tau));
         scatter.vector(&case, &output[3][..3], medium::scatter_weight(expected, tau, sigma_t, albedo));
+        let [share, way, ended, u] = [1, 2, 3, 4].map(|k| f64::from(input[k][3]));
+        let ended = ended > 0.0;
+        let rgb = medium::emitting_length_rgb(share, expected, tau, sigma_t, way, ended, u);
+        emitting_rgb.vector(&case, &output[4][..3], rgb);
+        let gray = medium::emitting_length(share, sigma_t.x, way, ended && sigma_t.x > 0.0);
+        emitting.scalar(&case, output[4][3], gray);
     }
     assert!(outputs.iter().flatten().all(|number| number.abs() <= INFINITE_DISTANCE), "a weight is not finite");
-    [weights, flight, probability, survival, scatter].into_iter().for_each(Comparison::finish);
+    [weights, flight, probability, survival, scatter, emitting, emitting_rgb].into_iter().for_each(Comparison::finish);
 }
 
 #[test]

@@ -97,6 +97,9 @@ void path_advance(inout Path path, Hit hit) {
     if (HAS_MEDIA) {
         medium = MEDIUM(valid_medium(path.medium));
         float way = t - path.t_min;
+        if (HAS_EMISSION) {
+            add_medium_emission(path, medium, way, !surface_hit && t < path.far_end);
+        }
         path.tau_left -= way * (HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
         if (HAS_CHROMATIC) {
             path.tau_rgb += medium.sigma_t * way;

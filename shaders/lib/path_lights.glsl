@@ -44,6 +44,22 @@ void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
     path.radiance += survived_throughput(path) * light.radiance * scattering_mis_weight(path, survival(path), light_pdf);
 }
 
+// Adds what a medium emits along the flight through it, from t_min on.
+void add_medium_emission(inout Path path, Medium medium, float way, bool ended) {
+    if (max_component(medium.emission) == 0.0 || !emitters_seen(path)) {
+        return;
+    }
+    vec3 length_rgb;
+    if (HAS_CHROMATIC) {
+        float u = sample_set(path, EMISSION_SETS + path.segment).x;
+        vec3 weights = channel_weights(path.throughput);
+        length_rgb = emitting_length_rgb(medium.collision_share, weights, path.tau_rgb, medium.sigma_t, way, ended, u);
+    } else {
+        length_rgb = vec3(emitting_length(medium.collision_share, medium.sigma_t.x, way, ended));
+    }
+    path.radiance += path.throughput * medium.emission * length_rgb;
+}
+
 // Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.
 bool sample_light(inout Path path, Vertex vertex, vec2 u, float lobe) {
     if (!HAS_LIGHT_SAMPLING) {

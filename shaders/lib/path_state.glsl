@@ -3,6 +3,9 @@
 #include "lib/sampler.glsl"
 #include "lib/medium.glsl"
 
+// Sets of the numbers that choose points of emission, one for each segment: beyond all others.
+const uint EMISSION_SETS = 0x80000000u;
+
 struct Path {
     uint pixel;             // of the whole film
     uint sample_index;

@@ -15,6 +15,8 @@ pub struct Features {
     pub henyey_greenstein: bool,
     /// A medium with a mixture of phase functions.
     pub phases: bool,
+    /// A medium that emits.
+    pub emission: bool,
     /// A surface that rays cross without an event.
     pub boundaries: bool,
     /// Spheres among the primitives.
@@ -55,7 +57,8 @@ impl Features {
     /// What the scene and its tables need.
     pub fn of(scene: &Scene, packed: &Packed) -> Features {
         let Integrator { max_depth, rr_depth, hide_emitters } = scene.integrator;
-        let media = packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
+        let emission = packed.media.iter().any(|medium| medium.emission != glam::Vec3::ZERO);
+        let media = emission || packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
         let kind = |kind: u32| packed.lights.iter().any(|light| light.kind == kind);
         let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
         let area_lights = kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD) || kind(LIGHT_SPHERE);
@@ -65,6 +68,7 @@ impl Features {
             chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x)),
             henyey_greenstein: packed.media.iter().any(|medium| medium.g != 0.0),
             phases: packed.media.iter().any(|medium| medium.phase != 0),
+            emission,
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
             spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
             area_lights,
@@ -96,6 +100,7 @@ impl Features {
             chromatic: true,
             henyey_greenstein: true,
             phases: true,
+            emission: true,
             boundaries: true,
             spheres: true,
             area_lights: true,
@@ -119,6 +124,7 @@ impl Features {
             ("HAS_CHROMATIC", self.chromatic),
             ("HAS_HENYEY_GREENSTEIN", self.henyey_greenstein),
             ("HAS_PHASES", self.phases),
+            ("HAS_EMISSION", self.emission),
             ("HAS_BOUNDARIES", self.boundaries),
             ("HAS_SPHERES", self.spheres),
             ("HAS_AREA_LIGHTS", self.area_lights),

@@ -158,6 +158,14 @@ gpu_struct! {
         emission: Vec3,
         /// Index of the light that stands for the medium's emission, plus one; 0 if it does not emit or is not sampled.
         light: u32,
+        /// Share of the emission that is counted where flights end; the rest is counted along the way. In \[0, 1).
+        collision_share: f32,
+        /// Fills the sixteen bytes.
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
+        /// Fills the sixteen bytes.
+        unused_3: u32,
     }
 }
 

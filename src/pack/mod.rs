@@ -4,6 +4,7 @@ use crate::scene::{Bsdf, Geometry, MediumId, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
+pub mod emission;
 pub mod features;
 pub mod frame;
 pub mod layout;
@@ -72,6 +73,9 @@ pub enum PackError {
         /// Different components.
         count: usize,
     },
+    /// A medium without bounds that emits more than it takes away.
+    #[error("\"{0}\" fills all space and emits light that it does not absorb: its radiance is infinite")]
+    EndlessEmission(String),
     /// A value that single precision cannot hold in the canonical frame.
     #[error("{what} of \"{name}\" is {value:e} per canonical unit, which single precision cannot hold")]
     OutOfRange {
@@ -105,7 +109,7 @@ impl Packed {
             return Err(PackError::TooManyMedia(scene.media.len()));
         }
         let (mut phases, mut values) = (Vec::new(), Vec::new());
-        let media = pack_media(scene, &frame, &mut phases, &mut values)?;
+        let media = pack_media(scene, &frame, nesting.world, &mut phases, &mut values)?;
         let mut surfaces = Vec::with_capacity(scene.shapes.len());
         let mut primitives = Vec::new();
         let mut lights = LightTable::default();
@@ -168,6 +172,7 @@ const EMPTY_FEATURES: Features = Features {
     chromatic: false,
     henyey_greenstein: false,
     phases: false,
+    emission: false,
     boundaries: false,
     spheres: false,
     area_lights: false,
@@ -195,18 +200,22 @@ fn medium_index(medium: Option<MediumId>) -> u32 {
 fn pack_media(
     scene: &Scene,
     frame: &Frame,
+    world: Option<MediumId>,
     phases: &mut Vec<layout::Phase>,
     values: &mut Vec<f32>,
 ) -> Result<Vec<Medium>, PackError> {
     let mut media = vec![Medium::default()];
-    for medium in &scene.media {
+    for (index, medium) in scene.media.iter().enumerate() {
+        let id = MediumId(index as u32);
         let sigma_t = frame.per_length(medium.sigma_t);
         if !sigma_t.is_finite() {
             let value = (medium.sigma_t / frame.scale).max_element();
             return Err(PackError::OutOfRange { what: "sigma_t", name: medium.name.clone(), value });
         }
         let (g, phase) = phase::pack(medium, phases, values)?;
-        media.push(Medium { sigma_t, g, phase, albedo: medium.albedo.as_vec3(), ..Medium::default() });
+        let albedo = medium.albedo.as_vec3();
+        let (emission, collision_share) = emission::pack(scene, frame, id, world == Some(id))?;
+        media.push(Medium { sigma_t, g, albedo, phase, emission, collision_share, ..Medium::default() });
     }
     Ok(media)
 }

@@ -3,16 +3,10 @@
 
 use super::PackError;
 use crate::scene::{Bsdf, Geometry, Light, Scene, Shape, Texture};
-use glam::DVec3;
 
 /// Refuses the first thing that cannot be rendered; returns what is rendered in a simpler way, for people.
 pub fn check(scene: &Scene) -> Result<Vec<String>, PackError> {
     let unsupported = |what: &'static str, name: String| Err(PackError::Unsupported { what, name });
-    for medium in &scene.media {
-        if medium.emission != DVec3::ZERO {
-            return unsupported("the emission", medium.name.clone());
-        }
-    }
     for (index, light) in scene.lights.iter().enumerate() {
         let what = match light {
             Light::Point { .. } | Light::Constant { .. } => continue,

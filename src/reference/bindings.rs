@@ -74,6 +74,7 @@ pub struct Medium {
     pub phase: u32,
     pub emission: DVec3,
     pub light: u32,
+    pub collision_share: f64,
 }
 
 /// See [`layout::Light`].
@@ -190,6 +191,7 @@ impl From<&layout::Medium> for Medium {
             phase: from.phase,
             emission: from.emission.as_dvec3(),
             light: from.light,
+            collision_share: f64::from(from.collision_share),
         }
     }
 }

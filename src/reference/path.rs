@@ -6,7 +6,7 @@ use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
 use super::math::{exp_minus_rgb, max_component, to_frame};
 use super::medium::{channel_weights, cross_boundary, scatter_weight};
-use super::path_lights::{add_constant_light, add_emission, sample_light};
+use super::path_lights::{add_constant_light, add_emission, add_medium_emission, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_set, survived_throughput};
@@ -96,6 +96,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
     // The optical depth of the way through the medium since `t_min`.
     let medium = *medium_at(tables, path.medium);
     let way = t - path.t_min;
+    add_medium_emission(tables, path, &medium, way, !surface_hit && t < path.far_end);
     path.tau_left -= way * medium.sigma_t[path.channel as usize];
     path.tau_rgb += medium.sigma_t * way;
     if !surface_hit && t >= path.far_end {

@@ -1,13 +1,14 @@
 //! Mirror of `shaders/lib/path_lights.glsl`: how a path comes to light, by chance or by light sampling.
 
-use super::bindings::{Light, Primitive, Tables};
+use super::bindings::{Light, Medium, Primitive, Tables};
 use super::bsdf::BsdfSample;
 use super::light::{
     LightSample, alias_keeps, alias_line, area_pdf, sample_plane_light, sample_point_light, sample_sphere_light,
     sphere_light_pdf,
 };
 use super::math::max_component;
-use super::path_state::{INFINITE_DISTANCE, Path, survival, survived_throughput};
+use super::medium::{channel_weights, emitting_length, emitting_length_rgb};
+use super::path_state::{EMISSION_SETS, INFINITE_DISTANCE, Path, sample_set, survival, survived_throughput};
 use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
 use crate::pack::layout::{LIGHT_CONSTANT, LIGHT_POINT, LIGHT_SPHERE};
 use glam::{DVec2, DVec3};
@@ -52,6 +53,22 @@ pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: 
     let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
     let weight = scattering_mis_weight(path, survival(path), light_pdf);
     path.radiance += survived_throughput(path) * light.radiance * weight;
+}
+
+/// Adds what a medium emits along the flight through it, from `t_min` on.
+pub fn add_medium_emission(tables: &Tables, path: &mut Path, medium: &Medium, way: f64, ended: bool) {
+    if max_component(medium.emission) == 0.0 || !emitters_seen(tables, path) {
+        return;
+    }
+    let (share, sigma_t) = (medium.collision_share, medium.sigma_t);
+    let length = if tables.features.chromatic {
+        let u = sample_set(tables, path, EMISSION_SETS + path.segment).x;
+        let weights = channel_weights(path.throughput);
+        emitting_length_rgb(share, weights, path.tau_rgb, sigma_t, way, ended, u)
+    } else {
+        DVec3::splat(emitting_length(share, sigma_t.x, way, ended))
+    };
+    path.radiance += path.throughput * medium.emission * length;
 }
 
 /// Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.

@@ -13,6 +13,9 @@ pub const NONE: u32 = u32::MAX;
 /// Longest distance; rays that end nowhere end here.
 pub const INFINITE_DISTANCE: f64 = layout::INFINITE_DISTANCE as f64;
 
+/// Sets of the numbers that choose points of emission, one for each segment: beyond all others.
+pub const EMISSION_SETS: u32 = 0x8000_0000;
+
 /// A path between two rays.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Path {

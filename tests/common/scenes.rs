@@ -193,6 +193,21 @@ pub fn mixed_phases() -> Scene {
     scene
 }
 
+/// Media that glow: a gray one that scatters, a chromatic one in it, and one that is nothing but light, over a floor.
+pub fn glow() -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    walls(&mut scene);
+    let mut add = |name: &str, sigma_t, albedo, emission, center, radius| {
+        let medium = Medium { emission, ..Medium::new(name, sigma_t, albedo, phase(0.4)) };
+        let id = scene.add_medium(medium);
+        scene.shapes.push(Shape::boundary(name, ball(center, radius), id));
+    };
+    add("fire", v(2.0, 2.0, 2.0), DVec3::splat(0.8), v(3.0, 1.5, 0.4), v(-0.3, -0.3, 0.0), 0.5);
+    add("core", v(0.5, 3.0, 9.0), v(0.2, 0.6, 0.9), v(1.0, 4.0, 9.0), v(-0.3, -0.3, 0.1), 0.25);
+    add("light", DVec3::ZERO, DVec3::ZERO, v(0.5, 0.7, 1.0), v(0.5, 0.3, 0.0), 0.3);
+    scene
+}
+
 /// All scenes of this file, by name.
 pub fn all() -> Vec<(&'static str, Scene)> {
     vec![
@@ -202,6 +217,7 @@ pub fn all() -> Vec<(&'static str, Scene)> {
         ("point light", point_light()),
         ("sphere light", sphere_light()),
         ("mixed phases", mixed_phases()),
+        ("glow", glow()),
     ]
 }
 
