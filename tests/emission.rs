@@ -190,3 +190,44 @@ fn hidden_emitters_hide_a_glow_from_the_camera_alone() {
     scene.media[0] = Medium { albedo: DVec3::splat(0.9), ..scene.media[0].clone() };
     assert!(images::average(&images::on_device(&scenes::pack(&scene, 1), 16)).min_element() > 0.05);
 }
+
+#[test]
+fn a_floor_is_lit_by_a_glow_with_and_without_light_sampling() {
+    // A cube of absorbing, glowing gas, turned, and with a hole of another gas in it, over a floor, behind a bar that shades a
+    // part of it: light sampling and chance must agree, and sampling must pay.
+    let mut scene = scenes::one_ray(v(0.0, 0.3, 3.0), DVec3::ZERO, 16);
+    let glow = |name: &str, sigma_t, emission| Medium {
+        emission,
+        ..Medium::new(name, sigma_t, DVec3::splat(0.3), Phase::Isotropic)
+    };
+    let gas = scene.add_medium(glow("gas", DVec3::splat(1.5), v(3.0, 2.0, 1.0)));
+    let inner = scene.add_medium(glow("inner", DVec3::ZERO, v(0.0, 5.0, 9.0)));
+    let floor = scenes::quad(v(-4.0, 0.0, 4.0), DVec3::X * 8.0, DVec3::NEG_Z * 8.0);
+    scene.shapes.push(Shape::diffuse("floor", floor, DVec3::splat(0.5)));
+    let turned = DMat4::from_translation(v(0.3, 1.5, 0.0)) * DMat4::from_rotation_z(0.5);
+    let cube = scenes::cuboid(turned * DMat4::from_scale(DVec3::splat(0.25)));
+    scene.shapes.push(Shape::boundary("gas", cube, gas));
+    scene.shapes.push(Shape::boundary("inner", scenes::ball(v(0.35, 1.5, 0.0), 0.15), inner));
+    let bar = scenes::quad(v(0.1, 0.8, 0.5), DVec3::X * 0.2, DVec3::NEG_Z);
+    scene.shapes.push(Shape::diffuse("bar", bar, DVec3::splat(0.2)));
+    let packed = scenes::pack(&scene, 5);
+    assert!(packed.features.volume_lights && packed.features.light_sampling);
+    assert_eq!((packed.lights.len(), packed.media[1].light, packed.media[2].light), (2, 1, 2));
+    let estimate = |packed: &Packed| {
+        let batches: Vec<f64> = images::batches_of(packed, 512).iter().map(|batch| batch.element_sum()).collect();
+        mean_and_error(&batches)
+    };
+    let (sampled, error) = estimate(&packed);
+    let mut by_chance = packed.clone();
+    by_chance.features.light_sampling = false;
+    let (found, coarse) = estimate(&by_chance);
+    eprintln!("sampled {sampled:.5} ± {error:.1e}, by chance {found:.5} ± {coarse:.1e}");
+    let z = |sampled: f64| (sampled - found) / error.hypot(coarse);
+    assert!(z(sampled).abs() < 3.5, "{}", z(sampled));
+    assert!(error < 0.2 * coarse, "light sampling does not pay: {error:e} against {coarse:e}");
+    assert!(coarse < 0.015 * found && z(sampled * 1.15).abs() > 5.0, "blind: {coarse:e}");
+    // A light of the wrong medium brings nothing from its points, and what chance leaves of it is too little.
+    let mut wrong = packed;
+    wrong.lights.iter_mut().for_each(|light| light.edge_1.y += 7.0);
+    assert!(z(estimate(&wrong).0).abs() > 5.0);
+}

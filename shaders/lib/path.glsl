@@ -170,6 +170,11 @@ void path_light(inout Path path, Hit hit) {
                 transmittance = vec3(survives);
             }
         }
+        if (HAS_VOLUME_LIGHTS && LIGHT(path.light).kind == LIGHT_VOLUME) {
+            // The point lies in the sphere about the medium, but perhaps not in the medium itself.
+            survives = 1.0;
+            transmittance = float(hit.medium) == LIGHT(path.light).edge_1.y ? transmittance : vec3(0.0);
+        }
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
     }
     path.shadow = false;

@@ -57,7 +57,13 @@ void add_medium_emission(inout Path path, Medium medium, float way, bool ended) 
     } else {
         length_rgb = vec3(emitting_length(medium.collision_share, medium.sigma_t.x, way, ended));
     }
-    path.radiance += path.throughput * medium.emission * length_rgb;
+    float mis_weight = 1.0;
+    if (HAS_VOLUME_LIGHTS && HAS_LIGHT_SAMPLING && medium.light != 0u) {
+        // Of the direction alone: whatever lies on the way, light sampling has the same density for all of its points.
+        Light light = LIGHT(medium.light - 1u);
+        mis_weight = scattering_mis_weight(path, 1.0, light.probability * volume_light_pdf(light, path.origin, path.direction));
+    }
+    path.radiance += path.throughput * medium.emission * length_rgb * mis_weight;
 }
 
 // Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.
@@ -79,6 +85,8 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u, float lobe) {
         BsdfSample scattered = sample_scattering(vertex, u, lobe);
         vec3 weight = scattered.pdf > 0.0 ? light.radiance / scattered.pdf : vec3(0.0);
         found = LightSample(scattered.direction, INFINITE_DISTANCE, weight, scattered.pdf);
+    } else if (HAS_VOLUME_LIGHTS && light.kind == LIGHT_VOLUME) {
+        found = sample_volume_light(light, vertex.point, u, sample_set(path, EMISSION_SETS + path.segment).y);
     } else if (HAS_POINT_LIGHTS && light.kind == LIGHT_POINT) {
         found = sample_point_light(light, vertex.point);
     } else if (HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE) {

@@ -54,6 +54,7 @@ struct Hit {
     float tau;              // shadow rays: optical depth
     vec3 tau_rgb;
     bool blocked;           // shadow rays: something is in the way
+    uint medium;            // shadow rays to an emitting medium: the medium at the end of the ray
 };
 
 // The four numbers of a set.

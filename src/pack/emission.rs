@@ -1,7 +1,7 @@
 //! What media emit: their radiance per length, and how it is best counted.
 
 use super::PackError;
-use super::frame::Frame;
+use super::frame::{Bounds, Frame};
 use crate::scene::{Geometry, MediumId, Scene};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -47,6 +47,41 @@ fn mean_chord(scene: &Scene, id: MediumId) -> f64 {
         (volume + one.0, area + one.1)
     });
     if area > 0.0 { 4.0 * volume / area } else { 0.0 }
+}
+
+/// The sphere about what an emitting medium fills, and its volume, in canonical units.
+#[derive(Clone, Copy, Debug)]
+pub struct EmittingVolume {
+    /// Of the sphere.
+    pub center: Vec3,
+    /// Of the sphere; all of the medium is inside.
+    pub radius: f32,
+    /// Of the medium itself, without what is nested in it.
+    pub volume: f64,
+}
+
+/// The volume of an emitting medium; `None` if it does not emit, or is not the interior of any shape.
+pub fn enclosing_volume(scene: &Scene, frame: &Frame, id: MediumId) -> Option<EmittingVolume> {
+    let filled = || scene.shapes.iter().filter(|shape| shape.boundary.is_some_and(|both| both.interior == Some(id)));
+    if scene.media[id.0 as usize].emission == DVec3::ZERO || filled().next().is_none() {
+        return None;
+    }
+    let bounds = filled().fold(Bounds::EMPTY, |bounds, shape| bounds.union(Bounds::of(&shape.geometry)));
+    if bounds.is_empty() {
+        return None;
+    }
+    let center = (bounds.min + bounds.max) / 2.0;
+    let reach = |geometry: &Geometry| match geometry {
+        Geometry::Sphere { center: other, radius, .. } => center.distance(*other) + radius,
+        Geometry::Mesh(mesh) => {
+            let corners = mesh.triangles.iter().flatten().map(|corner| mesh.positions[*corner as usize]);
+            corners.map(|corner| corner.distance(center)).fold(0.0, f64::max)
+        }
+    };
+    let radius = filled().map(|shape| reach(&shape.geometry)).fold(0.0, f64::max);
+    let volume = filled().map(|shape| volume_and_area(&shape.geometry).0).sum::<f64>() * frame.scale.powi(3);
+    // A little larger, so that rounding leaves nothing outside.
+    Some(EmittingVolume { center: frame.point(center), radius: frame.length(radius * 1.00001), volume })
 }
 
 /// Volume (by Gauss's theorem) and area of a closed surface.

@@ -17,6 +17,8 @@ pub struct Features {
     pub phases: bool,
     /// A medium that emits.
     pub emission: bool,
+    /// A medium that emits and is sampled as a light.
+    pub volume_lights: bool,
     /// A surface that rays cross without an event.
     pub boundaries: bool,
     /// Spheres among the primitives.
@@ -69,6 +71,7 @@ impl Features {
             henyey_greenstein: packed.media.iter().any(|medium| medium.g != 0.0),
             phases: packed.media.iter().any(|medium| medium.phase != 0),
             emission,
+            volume_lights: kind(LIGHT_VOLUME),
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
             spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
             area_lights,
@@ -86,7 +89,8 @@ impl Features {
             },
             hide_emitters,
             // Where the only light is the surroundings and nothing absorbs on the way, scattered rays find it just as well.
-            light_sampling: max_depth > 1 && (area_lights || kind(LIGHT_POINT) || (kind(LIGHT_CONSTANT) && media)),
+            light_sampling: max_depth > 1
+                && (area_lights || kind(LIGHT_POINT) || kind(LIGHT_VOLUME) || (kind(LIGHT_CONSTANT) && media)),
             max_depth,
             rr_depth,
             node_copies: packed.bvh.copies,
@@ -101,6 +105,7 @@ impl Features {
             henyey_greenstein: true,
             phases: true,
             emission: true,
+            volume_lights: true,
             boundaries: true,
             spheres: true,
             area_lights: true,
@@ -125,6 +130,7 @@ impl Features {
             ("HAS_HENYEY_GREENSTEIN", self.henyey_greenstein),
             ("HAS_PHASES", self.phases),
             ("HAS_EMISSION", self.emission),
+            ("HAS_VOLUME_LIGHTS", self.volume_lights),
             ("HAS_BOUNDARIES", self.boundaries),
             ("HAS_SPHERES", self.spheres),
             ("HAS_AREA_LIGHTS", self.area_lights),

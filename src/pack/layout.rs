@@ -382,6 +382,9 @@ pub const LIGHT_SPHERE: u32 = 2;
 pub const LIGHT_POINT: u32 = 3;
 /// [`Light::kind`]: the same radiance from every direction.
 pub const LIGHT_CONSTANT: u32 = 4;
+/// [`Light::kind`]: a medium that emits, within a sphere about it: `origin` and `edge_1.x` are its centre and radius, `alias` and
+/// the rest as ever, `radiance` what the medium emits per canonical unit of length, `edge_1.y` the index of the medium.
+pub const LIGHT_VOLUME: u32 = 8;
 /// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
 pub const TILE: u32 = 8;
 /// Longest distance; rays that end nowhere end here.
@@ -422,6 +425,7 @@ pub fn glsl() -> String {
         ("LIGHT_SPHERE", LIGHT_SPHERE),
         ("LIGHT_POINT", LIGHT_POINT),
         ("LIGHT_CONSTANT", LIGHT_CONSTANT),
+        ("LIGHT_VOLUME", LIGHT_VOLUME),
         ("TILE", TILE),
         ("BLOCK_SAMPLES", crate::render::BLOCK_SAMPLES),
         ("POINT_BITS", sobol::POINT_BITS),

@@ -109,7 +109,7 @@ impl Packed {
             return Err(PackError::TooManyMedia(scene.media.len()));
         }
         let (mut phases, mut values) = (Vec::new(), Vec::new());
-        let media = pack_media(scene, &frame, nesting.world, &mut phases, &mut values)?;
+        let mut media = pack_media(scene, &frame, nesting.world, &mut phases, &mut values)?;
         let mut surfaces = Vec::with_capacity(scene.shapes.len());
         let mut primitives = Vec::new();
         let mut lights = LightTable::default();
@@ -123,6 +123,11 @@ impl Packed {
         }
         for light in &scene.lights {
             lights.add(light, &frame);
+        }
+        for (index, medium) in media.iter_mut().enumerate().skip(1) {
+            if let Some(volume) = emission::enclosing_volume(scene, &frame, MediumId(index as u32 - 1)) {
+                medium.light = lights.add_volume(volume, index as u32, medium.emission) + 1;
+            }
         }
         let (bvh, primitives) = Bvh::new(&primitives);
         let lights = lights.finish();
@@ -173,6 +178,7 @@ const EMPTY_FEATURES: Features = Features {
     henyey_greenstein: false,
     phases: false,
     emission: false,
+    volume_lights: false,
     boundaries: false,
     spheres: false,
     area_lights: false,

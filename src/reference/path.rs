@@ -12,7 +12,7 @@ pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_set, survived_throughput};
 use super::path_vertex::{Vertex, medium_towards, offset_origin, sample_scattering, surface_point};
 use super::ray::offset_distance;
-use crate::pack::layout::{PRIMITIVE_BOUNDARY, SURFACE_ORIENTED, SURFACE_TWO_SIDED};
+use crate::pack::layout::{LIGHT_VOLUME, PRIMITIVE_BOUNDARY, SURFACE_ORIENTED, SURFACE_TWO_SIDED};
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
 /// Depth at which roulette begins to end paths that lose nothing.
@@ -154,8 +154,14 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
 /// Answers a shadow ray.
 pub fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
     if !hit.blocked {
-        let transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
-        let survives = channel_weights(path.light_channels).dot(transmittance);
+        let mut transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
+        let mut survives = channel_weights(path.light_channels).dot(transmittance);
+        let light = &tables.lights[path.light as usize];
+        if light.kind == LIGHT_VOLUME {
+            // The point lies in the sphere about the medium, but perhaps not in the medium itself.
+            survives = 1.0;
+            transmittance *= f64::from(u8::from(f64::from(hit.medium) == light.edge_1.y));
+        }
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
     }
     path.shadow = false;

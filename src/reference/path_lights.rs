@@ -4,13 +4,13 @@ use super::bindings::{Light, Medium, Primitive, Tables};
 use super::bsdf::BsdfSample;
 use super::light::{
     LightSample, alias_keeps, alias_line, area_pdf, sample_plane_light, sample_point_light, sample_sphere_light,
-    sphere_light_pdf,
+    sample_volume_light, sphere_light_pdf, volume_light_pdf,
 };
 use super::math::max_component;
 use super::medium::{channel_weights, emitting_length, emitting_length_rgb};
 use super::path_state::{EMISSION_SETS, INFINITE_DISTANCE, Path, sample_set, survival, survived_throughput};
 use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
-use crate::pack::layout::{LIGHT_CONSTANT, LIGHT_POINT, LIGHT_SPHERE};
+use crate::pack::layout::{LIGHT_CONSTANT, LIGHT_POINT, LIGHT_SPHERE, LIGHT_VOLUME};
 use glam::{DVec2, DVec3};
 
 /// Weight of a direction found by scattering that light sampling finds with density `light_pdf`: the balance heuristic
@@ -68,7 +68,14 @@ pub fn add_medium_emission(tables: &Tables, path: &mut Path, medium: &Medium, wa
     } else {
         DVec3::splat(emitting_length(share, sigma_t.x, way, ended))
     };
-    path.radiance += path.throughput * medium.emission * length;
+    let mut mis_weight = 1.0;
+    if tables.features.light_sampling && medium.light != 0 {
+        // Of the direction alone: whatever lies on the way, light sampling has the same density for all of its points.
+        let light = &tables.lights[medium.light as usize - 1];
+        let light_pdf = light.probability * volume_light_pdf(light, path.origin, path.direction);
+        mis_weight = scattering_mis_weight(path, 1.0, light_pdf);
+    }
+    path.radiance += path.throughput * medium.emission * length * mis_weight;
 }
 
 /// Chooses a light and a point on it, and sets up the shadow ray. Returns whether there is anything to ask for.
@@ -87,6 +94,10 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
             let BsdfSample { direction, pdf, .. } = sample_scattering(tables, vertex, u, lobe);
             let weight = if pdf > 0.0 { light.radiance / pdf } else { DVec3::ZERO };
             LightSample { direction, distance: INFINITE_DISTANCE, weight, pdf }
+        }
+        LIGHT_VOLUME => {
+            let u_distance = sample_set(tables, path, EMISSION_SETS + path.segment).y;
+            sample_volume_light(light, vertex.point, u, u_distance)
         }
         LIGHT_POINT => sample_point_light(light, vertex.point),
         LIGHT_SPHERE => sample_sphere_light(light, vertex.point, u),

@@ -96,6 +96,8 @@ pub struct Hit {
     pub tau_rgb: DVec3,
     /// Shadow rays: something is in the way.
     pub blocked: bool,
+    /// Shadow rays: the medium at the end of the ray.
+    pub medium: u32,
 }
 
 /// The four numbers of a set.
