@@ -47,7 +47,7 @@ pub fn pack(medium: &scene::Medium, phases: &mut Vec<Phase>, values: &mut Vec<f3
             ..Phase::default()
         });
     }
-    Ok((0.0, first + 1 | (components.len() as u32) << 24))
+    Ok((0.0, (first + 1) | (components.len() as u32) << 24))
 }
 
 /// Appends the components of a phase function of which there is a share.
