@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::phases;
 use common::random::Random;
 use common::scenes::v;
 use common::statistics::{check_uniform, chi_squared_tail, sidak_bound, student_tails};
@@ -28,16 +29,16 @@ struct Scattered {
 
 fn scatter(g: f64, numbers: &[f64], seed: u64) -> Vec<Scattered> {
     let mut random = Random(seed);
-    let inputs: Vec<[f32; 4]> =
-        numbers.iter().flat_map(|&u| [vec4(&[g, u, random.unit()]), vec4(&random.direction().to_array())]).collect();
-    let outputs: Vec<[f32; 4]> = run("phase", &inputs, &[], numbers.len(), 2 * numbers.len());
+    let mut query = |u: f64| [vec4(&[g, u, random.unit()]), vec4(&random.direction().to_array()), [0.0; 4]];
+    let inputs: Vec<[f32; 4]> = numbers.iter().flat_map(|&u| query(u)).collect();
+    let outputs = phases::ask(&[], &[], &inputs);
     let one = |(input, output): (&[[f32; 4]], &[[f32; 4]])| {
         let [one_minus_cos, cosine, sine, pdf] = output[0].map(f64::from);
         let direction = |vector: [f32; 4]| Vec3::from_slice(&vector[..3]).as_dvec3();
         let (before, after) = (direction(input[1]), direction(output[1]));
         Scattered { one_minus_cos, cosine, sine, pdf, before, after, eval: f64::from(output[1][3]) }
     };
-    inputs.chunks(2).zip(outputs.chunks(2)).map(one).collect()
+    inputs.chunks(3).zip(outputs.chunks(2)).map(one).collect()
 }
 
 /// g as the kernel knows it.
@@ -163,6 +164,21 @@ fn phase_functions_agree_with_the_table() {
         };
         assert_eq!(wrong(1.0, 1.0), None);
         assert!(wrong(-1.0, 1.0).is_some() && wrong(1.0, 1.001).is_some(), "{}: blind", row.id);
+        // As many in each of the twenty bins of equal probability: of the cosine, or of 1 - cos where the peak is narrow.
+        let mut random = Random(28);
+        let drawn = scatter(g, &(0..100_000).map(|_| random.unit()).collect::<Vec<_>>(), 29);
+        let narrow = g.abs() > 0.99;
+        let name = if narrow { "equiprobable_m_edges20_absg" } else { "equiprobable_cos_edges20" };
+        let mut edges = row.output(name).0;
+        edges.sort_by(f64::total_cmp);
+        assert_eq!(edges.len(), 21, "{}", row.id);
+        let in_bins = |shift: f64| {
+            let place = |sample: &Scattered| if narrow { sample.one_minus_cos } else { sample.cosine } + shift;
+            let bin = |place: f64| edges[1..20].partition_point(|edge| *edge <= place);
+            check_uniform(drawn.iter().map(|sample| (bin(place(sample)) as f64 + 0.5) / 20.0), 20)
+        };
+        in_bins(0.0).unwrap_or_else(|why| panic!("{}: {why}", row.id));
+        in_bins((edges[11] - edges[10]) * 0.2).expect_err("samples that are shifted by a fifth of a bin");
         // Legendre moments, over numbers in the middles of equal intervals: <P_l> = g^l.
         let count = 1 << 16;
         let middles: Vec<f64> = (0..count).map(|k| (f64::from(k) + 0.5) / f64::from(count)).collect();
@@ -233,8 +249,8 @@ fn free_flights_are_exponential() {
             .chunks(3)
             .flat_map(|depth| [[0.5, depth[0][0], sigma as f32, 0.0], [1.0; 4], [1.0; 4], [1.0; 4], [1.0; 4]])
             .collect();
-        let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], numbers.len(), 4 * numbers.len());
-        let distances: Vec<f64> = outputs.iter().step_by(4).map(|output| f64::from(output[1])).collect();
+        let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], numbers.len(), 5 * numbers.len());
+        let distances: Vec<f64> = outputs.iter().step_by(5).map(|output| f64::from(output[1])).collect();
         let ranks = |sigma: f64| distances.iter().map(move |t| 1.0 - (-sigma * t).exp()).collect::<Vec<_>>();
         check_uniform(ranks(sigma), 50).unwrap_or_else(|why| panic!("sigma_t = {sigma}: {why}"));
         check_uniform(ranks(sigma * 1.03), 50).expect_err("another extinction");

@@ -3,6 +3,7 @@
 mod common;
 
 use common::comparison::Comparison;
+use common::phases;
 use common::random::Random;
 use common::scenes::v;
 use common::tolerances::comparison;
@@ -156,13 +157,19 @@ fn media() {
         let sigma = if sigma[(3 - k % 3) % 3] == 0.0 { [1.0; 3] } else { sigma };
         let albedo = [random.unit(), random.unit(), 1.0];
         inputs.push(vec4(&[u, math::minus_log_1m(u), if k % 50 == 0 { 0.0 } else { depth }]));
-        inputs.extend([vec4(&throughput.to_array()), vec4(&tau), vec4(&sigma), vec4(&albedo)]);
+        let mut vectors = [vec4(&throughput.to_array()), vec4(&tau), vec4(&sigma), vec4(&albedo)];
+        // A share, a way that is short in the densest channel, whether the flight ended there, and a number.
+        let way = random.unit() * 3.0 / (1e-3 + sigma.into_iter().fold(0.0, f64::max));
+        let emission = [random.unit(), way, f64::from(k as u32 % 2), random.unit()];
+        vectors.iter_mut().zip(emission).for_each(|(vector, number)| vector[3] = number as f32);
+        inputs.extend(vectors);
     }
     let count = inputs.len() / 5;
-    let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], count, 4 * count);
+    let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], count, 5 * count);
     let names = ["channel_weights", "free_flight", "survival_probability", "survival_weight", "scatter_weight"];
     let [mut weights, mut flight, mut probability, mut survival, mut scatter] = names.map(comparison);
-    for (input, output) in inputs.chunks(5).zip(outputs.chunks(4)) {
+    let [mut emitting, mut emitting_rgb] = ["emitting_length", "emitting_length_rgb"].map(comparison);
+    for (input, output) in inputs.chunks(5).zip(outputs.chunks(5)) {
         let [u, tau_one, sigma_one, _] = input[0].map(f64::from);
         let [throughput, tau, sigma_t, albedo] = [1, 2, 3, 4].map(|k| widen(&input[k][..3]));
         let expected = medium::channel_weights(throughput);
@@ -175,9 +182,15 @@ fn media() {
         weights.vector(&case, &output[1][..3], expected);
         survival.vector(&case, &output[2][..3], medium::survival_weight(expected, tau));
         scatter.vector(&case, &output[3][..3], medium::scatter_weight(expected, tau, sigma_t, albedo));
+        let [share, way, ended, u] = [1, 2, 3, 4].map(|k| f64::from(input[k][3]));
+        let ended = ended > 0.0;
+        let rgb = medium::emitting_length_rgb(share, expected, tau, sigma_t, way, ended, u);
+        emitting_rgb.vector(&case, &output[4][..3], rgb);
+        let gray = medium::emitting_length(share, sigma_t.x, way, ended && sigma_t.x > 0.0);
+        emitting.scalar(&case, output[4][3], gray);
     }
     assert!(outputs.iter().flatten().all(|number| number.abs() <= INFINITE_DISTANCE), "a weight is not finite");
-    [weights, flight, probability, survival, scatter].into_iter().for_each(Comparison::finish);
+    [weights, flight, probability, survival, scatter, emitting, emitting_rgb].into_iter().for_each(Comparison::finish);
 }
 
 #[test]
@@ -187,14 +200,15 @@ fn phase_functions() {
     let magnitudes = [1e-8, 1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 0.5, 0.75, 0.9, 0.99, 0.999, 0.9999, 0.99999, 1.0 - 1e-6];
     for g in magnitudes.into_iter().flat_map(|g| [g, -g]).chain([0.0]) {
         for u in units_in_question().into_iter().step_by(3) {
-            inputs.extend([vec4(&[g, u, random.unit()]), vec4(&random.direction().to_array())]);
+            inputs.extend([vec4(&[g, u, random.unit()]), vec4(&random.direction().to_array()), [0.0; 4]]);
         }
     }
-    let count = inputs.len() / 2;
-    let outputs: Vec<[f32; 4]> = run("phase", &inputs, &[], count, 2 * count);
+    let count = inputs.len() / 3;
+    let outputs = phases::ask(&[], &[], &inputs);
+    assert_eq!(outputs.len(), 2 * count);
     let names = ["1 - cos", "cos", "sin", "henyey_greenstein_from", "scattered direction", "eval_henyey_greenstein"];
     let mut functions = names.map(comparison);
-    for (input, output) in inputs.chunks(2).zip(outputs.chunks(2)) {
+    for (input, output) in inputs.chunks(3).zip(outputs.chunks(2)) {
         let [g, u, turn, _] = input[0].map(f64::from);
         let before = widen(&input[1][..3]);
         let case = format!("g = {g}, u = {u}");

@@ -95,6 +95,35 @@ float sphere_light_pdf(float radius, float center_distance) {
     return center_distance < radius ? square_to_sphere_pdf() : square_to_cone_pdf(sphere_one_minus_cos(radius, center_distance));
 }
 
+// A point in the sphere about an emitting medium, from outside: its direction uniform over the cone, its distance over the chord.
+// The weight is the emission per length times the chord over the density of the direction. Nothing from inside, where flights
+// find the emission well.
+LightSample sample_volume_light(Light light, vec3 point, vec2 u, float u_distance) {
+    vec3 to_center = light.origin - point;
+    float radius = light.edge_1.x, center_distance = length(to_center);
+    if (center_distance <= radius) {
+        return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
+    }
+    float one_minus_cos = sphere_one_minus_cos(radius, center_distance);
+    vec3 direction = from_frame(to_center / center_distance, square_to_cone(u, one_minus_cos));
+    float pdf = square_to_cone_pdf(one_minus_cos);
+    float along = dot(to_center, direction);
+    vec3 closest = to_center - along * direction;
+    float half_chord = sqrt(max(radius * radius - dot(closest, closest), 0.0));
+    float distance = max(along + half_chord * (2.0 * u_distance - 1.0), 0.0);
+    return LightSample(direction, distance, light.radiance * (2.0 * half_chord / pdf), pdf);
+}
+
+// Density per solid angle with which directions to that sphere are sampled: 0 from inside and past it.
+float volume_light_pdf(Light light, vec3 point, vec3 direction) {
+    vec3 to_center = light.origin - point;
+    float radius = light.edge_1.x, center_distance = length(to_center);
+    float along = dot(to_center, direction);
+    vec3 closest = to_center - along * direction;
+    bool met = center_distance > radius && along > 0.0 && dot(closest, closest) <= radius * radius;
+    return met ? square_to_cone_pdf(sphere_one_minus_cos(radius, center_distance)) : 0.0;
+}
+
 LightSample sample_point_light(Light light, vec3 point) {
     vec3 offset = light.origin - point;
     float squared = dot(offset, offset);

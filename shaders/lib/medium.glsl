@@ -65,3 +65,17 @@ uint medium_of_code(uint sum, uint guess, uint medium_count) {
     }
     return NONE;
 }
+
+// Emission along a flight through a medium that adds 1 per unit of length: `way` is how far it went there, `ended` whether it
+// ended there and not at a boundary. The share is counted where the flight ends, the rest along the way; see src/pack/emission.rs.
+float emitting_length(float share, float sigma_t, float way, bool ended) {
+    return (1.0 - share) * way + (ended ? share / sigma_t : 0.0);
+}
+
+// The same where media are chromatic: tau is the optical depth up to where the flight entered, u in [0, 1) chooses the one
+// point that stands for the way. A point is passed with the probability that survives to it.
+vec3 emitting_length_rgb(float share, vec3 weights, vec3 tau, vec3 sigma_t, float way, bool ended, float u) {
+    vec3 along = (1.0 - share) * way * survival_weight(weights, tau + sigma_t * (u * way));
+    vec3 transmittance = exp_minus(tau + sigma_t * way);
+    return along + (ended ? share * transmittance / dot(weights, sigma_t * transmittance) : vec3(0.0));
+}

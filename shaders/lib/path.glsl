@@ -51,7 +51,7 @@ void scatter(inout Path path, Vertex vertex) {
         return;
     }
     vec4 u = sample_set(path, 2u * path.segment + 1u);
-    float lobe = HAS_LOBES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
+    float lobe = HAS_LOBES || HAS_PHASES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
     BsdfSample next = sample_scattering(vertex, u.zw, lobe);
     path.point = vertex.point;
     path.t_min = 0.0;
@@ -98,12 +98,15 @@ void path_advance(inout Path path, Hit hit) {
     if (HAS_MEDIA) {
         medium = MEDIUM(valid_medium(path.medium));
         end = end_flight(path, medium, t, surface_hit);
+        if (HAS_EMISSION) {
+            add_medium_emission(path, medium, end.scatters ? free_way(path, medium) : t - path.t_min, end.scatters);
+        }
     }
     if (end.scatters) {
         path.offset = 0.0;
         path.normal = path.direction;
         Surface none;
-        scatter(path, Vertex(flight_point(path, hit, end.way), path.direction, true, medium.g, end.weight, none, vec3(0.0)));
+        scatter(path, Vertex(flight_point(path, hit, end.way), path.direction, true, medium.g, medium.phase, end.weight, none, vec3(0.0)));
     } else {
         if (HAS_MEDIA) {
             // The optical depth of the way through the medium since t_min.
@@ -151,7 +154,7 @@ void path_advance(inout Path path, Hit hit) {
         vec3 axis = back && !(HAS_DIELECTRIC && (surface.flags & SURFACE_ORIENTED) != 0u) ? -normal : normal;
         path.offset = offset_distance(largest);
         path.normal = axis;
-        scatter(path, Vertex(point, axis, false, 0.0, vec3(0.0), surface, to_frame(axis, -path.direction)));
+        scatter(path, Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, to_frame(axis, -path.direction)));
     }
     if (!path.shadow && path.alive) {
         next_segment(path);
@@ -171,6 +174,11 @@ void path_light(inout Path path, Hit hit) {
                 survives = exp_minus(max(hit.tau, 0.0));
                 transmittance = vec3(survives);
             }
+        }
+        if (HAS_VOLUME_LIGHTS && LIGHT(path.light).kind == LIGHT_VOLUME) {
+            // The point lies in the sphere about the medium, but perhaps not in the medium itself.
+            survives = 1.0;
+            transmittance = float(hit.medium) == LIGHT(path.light).edge_1.y ? transmittance : vec3(0.0);
         }
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
     }

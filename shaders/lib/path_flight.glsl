@@ -23,6 +23,11 @@ bool light_pivot(Light light, vec2 u, out vec3 pivot) {
     return is_local(light);
 }
 
+// How far the free flight gets in the medium from t_min on.
+float free_way(Path path, Medium medium) {
+    return free_flight(path.tau_left, HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
+}
+
 // Where the flight ends on a ray that meets a surface at t_end, or nothing before t_end. A flight in a medium with equiangular
 // sampling is traced as far as it may get at all; whether it scatters on the way is decided by its free flight, and where, by
 // one of two techniques: the free flight itself, or with the probability `equiangular` distances that are likely near a light.

@@ -65,6 +65,28 @@ void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
     path.radiance += survived_throughput(path) * light.radiance * scattering_mis_weight(path, survival(path), light_pdf);
 }
 
+// Adds what a medium emits along the flight through it, from t_min on.
+void add_medium_emission(inout Path path, Medium medium, float way, bool ended) {
+    if (max_component(medium.emission) == 0.0 || !emitters_seen(path)) {
+        return;
+    }
+    vec3 length_rgb;
+    if (HAS_CHROMATIC) {
+        float u = sample_set(path, EMISSION_SETS + path.segment).x;
+        vec3 weights = channel_weights(path.throughput);
+        length_rgb = emitting_length_rgb(medium.collision_share, weights, path.tau_rgb, medium.sigma_t, way, ended, u);
+    } else {
+        length_rgb = vec3(emitting_length(medium.collision_share, medium.sigma_t.x, way, ended));
+    }
+    float mis_weight = 1.0;
+    if (HAS_VOLUME_LIGHTS && HAS_LIGHT_SAMPLING && medium.light != 0u) {
+        // Of the direction alone: whatever lies on the way, light sampling has the same density for all of its points.
+        Light light = LIGHT(medium.light - 1u);
+        mis_weight = scattering_mis_weight(path, 1.0, light.probability * volume_light_pdf(light, path.origin, path.direction));
+    }
+    path.radiance += path.throughput * medium.emission * length_rgb * mis_weight;
+}
+
 // Chooses a light and a point on it by u, and where a sampler has more to decide, by `decision`, and sets up the shadow ray. Returns whether there is anything to ask for.
 bool sample_light(inout Path path, Vertex vertex, vec2 u, vec2 decision) {
     if (!HAS_LIGHT_SAMPLING) {
@@ -79,6 +101,8 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u, vec2 decision) {
         BsdfSample scattered = sample_scattering(vertex, u, decision.x);
         vec3 weight = scattered.pdf > 0.0 ? light.radiance / scattered.pdf : vec3(0.0);
         found = LightSample(scattered.direction, INFINITE_DISTANCE, weight, scattered.pdf);
+    } else if (HAS_VOLUME_LIGHTS && light.kind == LIGHT_VOLUME) {
+        found = sample_volume_light(light, vertex.point, u, sample_set(path, EMISSION_SETS + path.segment).y);
     } else if (HAS_POINT_LIGHTS && light.kind == LIGHT_POINT) {
         found = sample_point_light(light, vertex.point);
     } else if (HAS_SPOT_LIGHTS && light.kind == LIGHT_SPOT) {

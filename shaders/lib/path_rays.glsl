@@ -18,10 +18,11 @@ vec3 depth_at_infinity(Path path) {
 Hit begin_hit(Path path) {
     // Extension rays see a little beyond their flight: see flight_point().
     float t_max = HAS_MEDIA && !path.shadow ? path.t_max + near_distance(path, path.t_max) : path.t_max;
-    Hit hit = Hit(t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false);
+    Hit hit = Hit(t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false, 0u);
     if (HAS_MEDIA && HAS_LIGHT_SAMPLING && path.shadow) {
         uint medium = HAS_DIELECTRIC ? path.light_medium : path.medium;
         vec3 tau = MEDIUM(valid_medium(medium)).sigma_t * shadow_length(path) + depth_at_infinity(path);
+        hit.medium = medium;
         hit.tau = tau.x;
         hit.tau_rgb = tau;
     }
@@ -41,6 +42,12 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
             if (HAS_CHROMATIC && counts && boundary) {
                 hit.tau_rgb += SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE)).sigma_t_step * way;
             }
+        }
+        if (HAS_VOLUME_LIGHTS && counts && boundary) {
+            // In any order: the differences of indices add up.
+            uint media = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE)).media;
+            uint inside = media & 0xffffu, outside = media >> 16u;
+            hit.medium += along_normal ? outside - inside : inside - outside;
         }
         // The light itself is not in the way of its light.
         hit.blocked = hit.blocked || (counts && !boundary && primitive.light != path.light + 1u);

@@ -7,6 +7,9 @@
 // More than minus_log_1m ever gives: no flight is longer.
 const float MAX_FLIGHT_TAU = 16.7;
 
+// Sets of the numbers that choose points of emission, one for each segment: beyond all others.
+const uint EMISSION_SETS = 0x80000000u;
+
 struct Path {
     uint pixel;             // of the whole film
     uint sample_index;
@@ -58,6 +61,7 @@ struct Hit {
     float tau;              // shadow rays: optical depth
     vec3 tau_rgb;
     bool blocked;           // shadow rays: something is in the way
+    uint medium;            // shadow rays to an emitting medium: the medium at the end of the ray
 };
 
 // The four numbers of a set.

@@ -11,6 +11,7 @@ struct Vertex {
     vec3 axis;      // z of the surface's local frame; in a medium, the direction of propagation
     bool in_medium;
     float g;        // of the medium
+    uint phase;     // of the medium: its mixture of phase functions, as in Medium; 0 is the one of g
     vec3 albedo;    // of the medium, with the weight of the flight
     Surface surface;
     vec3 incident;  // on a surface: towards where the path comes from, in the local frame
@@ -19,6 +20,10 @@ struct Vertex {
 // Scattering function times cosine, and the density with which directions are sampled.
 BsdfValue eval_scattering(Vertex vertex, vec3 direction) {
     if (HAS_MEDIA && vertex.in_medium) {
+        if (HAS_PHASES && vertex.phase != 0u) {
+            float mixed = eval_mixture(vertex.phase, vertex.axis, direction);
+            return BsdfValue(vertex.albedo * mixed, mixed);
+        }
         float phase = HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(vertex.g, vertex.axis, direction) : INV_4PI;
         return BsdfValue(vertex.albedo * phase, phase);
     }
@@ -28,7 +33,10 @@ BsdfValue eval_scattering(Vertex vertex, vec3 direction) {
 BsdfSample sample_scattering(Vertex vertex, vec2 u, float lobe) {
     if (HAS_MEDIA && vertex.in_medium) {
         vec3 direction;
-        if (HAS_HENYEY_GREENSTEIN && vertex.g != 0.0) {
+        if (HAS_PHASES && vertex.phase != 0u) {
+            PhaseAngle angle = sample_mixture(vertex.phase, u.x, lobe);
+            direction = from_frame(vertex.axis, from_polar(angle.cos_theta, angle.sin_theta, u.y));
+        } else if (HAS_HENYEY_GREENSTEIN && vertex.g != 0.0) {
             PhaseAngle angle = sample_henyey_greenstein(vertex.g, u.x);
             direction = from_frame(vertex.axis, from_polar(angle.cos_theta, angle.sin_theta, u.y));
         } else {

@@ -3,7 +3,8 @@
 //
 // The dimensions are named, so that a feature that a scene lacks never shifts the numbers of another:
 //   set 0          pixel x, pixel y, free flight, channel        of the camera's segment
-//   set 2 s        roulette, unused, free flight, channel        of segment s > 0
+//   set 2 s        roulette, lobe or component, free flight, channel    of segment s > 0 (the second: of the vertex before)
+//   set 2^31 + s   point of emission                             along segment s, in chromatic media
 //   set 2 s + 1    light x, light y, scatter x, scatter y        of the vertex at the end of segment s
 #include "lib/rng.glsl"
 

@@ -15,6 +15,12 @@ pub struct Features {
     pub henyey_greenstein: bool,
     /// A medium in which distances are also sampled by the angle under which a light sees them.
     pub equiangular: bool,
+    /// A medium with a mixture of phase functions.
+    pub phases: bool,
+    /// A medium that emits.
+    pub emission: bool,
+    /// A medium that emits and is sampled as a light.
+    pub volume_lights: bool,
     /// A surface that rays cross without an event.
     pub boundaries: bool,
     /// Spheres among the primitives.
@@ -64,7 +70,8 @@ impl Features {
     /// What the scene and its tables need.
     pub fn of(scene: &Scene, packed: &Packed) -> Features {
         let Integrator { max_depth, rr_depth, hide_emitters } = scene.integrator;
-        let media = packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
+        let emission = packed.media.iter().any(|medium| medium.emission != glam::Vec3::ZERO);
+        let media = emission || packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
         let lowest = (1 << LIGHT_TEXTURE_SHIFT) - 1;
         let kind = |kind: u32| packed.lights.iter().any(|light| light.kind & lowest == kind);
         let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
@@ -75,6 +82,9 @@ impl Features {
             chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x)),
             henyey_greenstein: packed.media.iter().any(|medium| medium.g != 0.0),
             equiangular: packed.media.iter().any(|medium| medium.equiangular > 0.0),
+            phases: packed.media.iter().any(|medium| medium.phase != 0),
+            emission,
+            volume_lights: kind(LIGHT_VOLUME),
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
             spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
             area_lights,
@@ -111,6 +121,9 @@ impl Features {
             chromatic: true,
             henyey_greenstein: true,
             equiangular: true,
+            phases: true,
+            emission: true,
+            volume_lights: true,
             boundaries: true,
             spheres: true,
             area_lights: true,
@@ -137,6 +150,9 @@ impl Features {
             ("HAS_CHROMATIC", self.chromatic),
             ("HAS_HENYEY_GREENSTEIN", self.henyey_greenstein),
             ("HAS_EQUIANGULAR", self.equiangular),
+            ("HAS_PHASES", self.phases),
+            ("HAS_EMISSION", self.emission),
+            ("HAS_VOLUME_LIGHTS", self.volume_lights),
             ("HAS_BOUNDARIES", self.boundaries),
             ("HAS_SPHERES", self.spheres),
             ("HAS_AREA_LIGHTS", self.area_lights),

@@ -162,10 +162,10 @@ gpu_struct! {
         least_sigma_t: f32,
         /// Share of equiangular sampling among the distances at which light scatters; 0: free flights alone.
         equiangular: f32,
+        /// Share of the emission that is counted where flights end; the rest is counted along the way. In \[0, 1).
+        collision_share: f32,
         /// Fills the sixteen bytes.
-        unused_1: u32,
-        /// Fills the sixteen bytes.
-        unused_2: u32,
+        unused: u32,
     }
 }
 
@@ -178,9 +178,10 @@ gpu_struct! {
         weight: f32,
         /// Mean cosine of Henyey and Greenstein's.
         g: f32,
-        /// Of a table: index of its first number among the values.
+        /// Of a table: index of its first number among the values. The densities come first, then as many numbers of the
+        /// distribution function.
         first_value: u32,
-        /// Of a table: numbers in it.
+        /// Of a table: densities in it, at cosines from -1 to 1 in equal steps.
         value_count: u32,
         /// Fills the sixteen bytes.
         unused_1: u32,
@@ -369,6 +370,12 @@ pub const BSDF_DIELECTRIC: u32 = 1;
 pub const BSDF_CONDUCTOR: u32 = 2;
 /// Kind of BSDF: a diffuse body under a smooth or rough varnish.
 pub const BSDF_PLASTIC: u32 = 3;
+/// [`Phase::kind`]: Henyey and Greenstein's.
+pub const PHASE_HENYEY_GREENSTEIN: u32 = 0;
+/// [`Phase::kind`]: Rayleigh's.
+pub const PHASE_RAYLEIGH: u32 = 1;
+/// [`Phase::kind`]: a table.
+pub const PHASE_TABULATED: u32 = 2;
 /// [`Light::kind`]: a triangle.
 pub const LIGHT_TRIANGLE: u32 = 0;
 /// [`Light::kind`]: a parallelogram.
@@ -389,6 +396,9 @@ pub const LIGHT_ENVMAP: u32 = 7;
 pub const LIGHT_TEXTURE_SHIFT: u32 = 8;
 /// [`Texture::kind`]: an environment map, which only a light refers to.
 pub const TEXTURE_SKY: u32 = 255;
+/// [`Light::kind`]: a medium that emits, within a sphere about it: `origin` and `edge_1.x` are its centre and radius, `alias` and
+/// the rest as ever, `radiance` what the medium emits per canonical unit of length, `edge_1.y` the index of the medium.
+pub const LIGHT_VOLUME: u32 = 8;
 /// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
 pub const TILE: u32 = 8;
 /// Longest distance; rays that end nowhere end here.
@@ -421,6 +431,9 @@ pub fn glsl() -> String {
         ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),
         ("BSDF_CONDUCTOR", BSDF_CONDUCTOR),
         ("BSDF_PLASTIC", BSDF_PLASTIC),
+        ("PHASE_HENYEY_GREENSTEIN", PHASE_HENYEY_GREENSTEIN),
+        ("PHASE_RAYLEIGH", PHASE_RAYLEIGH),
+        ("PHASE_TABULATED", PHASE_TABULATED),
         ("LIGHT_TRIANGLE", LIGHT_TRIANGLE),
         ("LIGHT_QUAD", LIGHT_QUAD),
         ("LIGHT_SPHERE", LIGHT_SPHERE),
@@ -430,6 +443,7 @@ pub fn glsl() -> String {
         ("LIGHT_DIRECTIONAL", LIGHT_DIRECTIONAL),
         ("LIGHT_ENVMAP", LIGHT_ENVMAP),
         ("LIGHT_TEXTURE_SHIFT", LIGHT_TEXTURE_SHIFT),
+        ("LIGHT_VOLUME", LIGHT_VOLUME),
         ("TILE", TILE),
         ("BLOCK_SAMPLES", crate::render::BLOCK_SAMPLES),
         ("POINT_BITS", sobol::POINT_BITS),

@@ -1,9 +1,10 @@
 //! The table of lights and the alias table by which one is chosen in constant time (Walker 1977, Vose 1991).
 
+use super::emission::EmittingVolume;
 use super::frame::Frame;
 use super::layout::{
     LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_SPOT,
-    LIGHT_TEXTURE_SHIFT, LIGHT_TRIANGLE, Light,
+    LIGHT_TEXTURE_SHIFT, LIGHT_TRIANGLE, LIGHT_VOLUME, Light,
 };
 use crate::scene;
 use glam::{DMat3, DVec3, Vec3};
@@ -61,6 +62,18 @@ impl LightTable {
             ..Light::default()
         };
         self.push(light, mean(radiance) * area * PI)
+    }
+
+    /// Adds a medium that emits, and returns the index of its light.
+    pub fn add_volume(&mut self, volume: EmittingVolume, medium: u32, emission: Vec3) -> u32 {
+        let light = Light {
+            origin: volume.center,
+            kind: LIGHT_VOLUME,
+            edge_1: Vec3::new(volume.radius, medium as f32, 0.0),
+            radiance: emission,
+            ..Light::default()
+        };
+        self.push(light, mean(emission.as_dvec3()) * 4.0 * PI * volume.volume)
     }
 
     /// Adds a light that shines from one place or one direction; those of the whole sky are left out.

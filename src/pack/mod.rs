@@ -4,6 +4,7 @@ use crate::scene::{self, Bsdf, Geometry, MediumId, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
+pub mod emission;
 pub mod features;
 mod flight;
 pub mod frame;
@@ -11,6 +12,7 @@ pub mod layout;
 pub mod lights;
 pub mod material;
 pub mod nesting;
+pub mod phase;
 pub mod sky;
 pub mod sobol;
 mod support;
@@ -62,6 +64,20 @@ pub enum PackError {
     /// More media than a surface can name.
     #[error("{0} media are more than the {max} that a scene can hold", max = MAX_MEDIA)]
     TooManyMedia(usize),
+    /// More components than one mixture of phase functions can name.
+    #[error(
+        "the phase function of \"{name}\" blends {count} different ones, more than the {max} that a medium can have",
+        max = phase::MAX_COMPONENTS
+    )]
+    TooManyPhases {
+        /// Of which medium.
+        name: String,
+        /// Different components.
+        count: usize,
+    },
+    /// A medium without bounds that emits more than it takes away.
+    #[error("\"{0}\" fills all space and emits light that it does not absorb: its radiance is infinite")]
+    EndlessEmission(String),
     /// A value that single precision cannot hold in the canonical frame.
     #[error("{what} of \"{name}\" is {value:e} per canonical unit, which single precision cannot hold")]
     OutOfRange {
@@ -105,7 +121,8 @@ impl Packed {
         if scene.media.len() > MAX_MEDIA {
             return Err(PackError::TooManyMedia(scene.media.len()));
         }
-        let mut media = pack_media(scene, &frame)?;
+        let (mut phases, mut values) = (Vec::new(), Vec::new());
+        let mut media = pack_media(scene, &frame, nesting.world, &mut phases, &mut values)?;
         let mut surfaces = Vec::with_capacity(scene.shapes.len());
         let mut primitives = Vec::new();
         let mut lights = LightTable::default();
@@ -117,7 +134,12 @@ impl Packed {
         if primitives.len() > bvh::MAX_PRIMITIVES {
             return Err(PackError::TooManyPrimitives(primitives.len()));
         }
-        let (mut textures, mut values) = (Vec::new(), Vec::new());
+        let mut textures = Vec::new();
+        for (index, medium) in media.iter_mut().enumerate().skip(1) {
+            if let Some(volume) = emission::enclosing_volume(scene, &frame, MediumId(index as u32 - 1)) {
+                medium.light = lights.add_volume(volume, index as u32, medium.emission) + 1;
+            }
+        }
         let first_sky = pack_lights(scene, &frame, &mut lights, &mut textures, &mut values)?;
         let (bvh, primitives) = Bvh::new(&primitives);
         let lights = lights.finish();
@@ -137,7 +159,7 @@ impl Packed {
         };
         let warnings = [nesting.warnings, simplified].concat();
         let features = EMPTY_FEATURES;
-        let (phases, corners) = (Vec::new(), Vec::new());
+        let corners = Vec::new();
         let mut packed = Packed {
             frame,
             bvh,
@@ -169,6 +191,9 @@ const EMPTY_FEATURES: Features = Features {
     chromatic: false,
     henyey_greenstein: false,
     equiangular: false,
+    phases: false,
+    emission: false,
+    volume_lights: false,
     boundaries: false,
     spheres: false,
     area_lights: false,
@@ -197,29 +222,28 @@ fn medium_index(medium: Option<MediumId>) -> u32 {
     medium.map_or(0, |MediumId(index)| index + 1)
 }
 
-fn pack_media(scene: &Scene, frame: &Frame) -> Result<Vec<Medium>, PackError> {
+fn pack_media(
+    scene: &Scene,
+    frame: &Frame,
+    world: Option<MediumId>,
+    phases: &mut Vec<layout::Phase>,
+    values: &mut Vec<f32>,
+) -> Result<Vec<Medium>, PackError> {
     let mut media = vec![Medium::default()];
-    for medium in &scene.media {
+    for (index, medium) in scene.media.iter().enumerate() {
+        let id = MediumId(index as u32);
         let sigma_t = frame.per_length(medium.sigma_t);
         if !sigma_t.is_finite() {
             let value = (medium.sigma_t / frame.scale).max_element();
             return Err(PackError::OutOfRange { what: "sigma_t", name: medium.name.clone(), value });
         }
-        let g = match medium.phase {
-            scene::Phase::HenyeyGreenstein { g } => nearest_below_one(g),
-            // `support` has refused all others.
-            _ => 0.0,
-        };
+        let (g, phase) = phase::pack(medium, phases, values)?;
+        let albedo = medium.albedo.as_vec3();
+        let (emission, collision_share) = emission::pack(scene, frame, id, world == Some(id))?;
         let least_sigma_t = sigma_t.min_element();
-        media.push(Medium { sigma_t, g, albedo: medium.albedo.as_vec3(), least_sigma_t, ..Medium::default() });
+        media.push(Medium { sigma_t, g, albedo, phase, emission, collision_share, least_sigma_t, ..Medium::default() });
     }
     Ok(media)
-}
-
-/// `g` in single precision, kept inside of (−1, 1) where rounding would reach the end.
-fn nearest_below_one(g: f64) -> f32 {
-    let most = 1.0 - f32::EPSILON / 2.0;
-    (g as f32).clamp(-most, most)
 }
 
 fn pack_surface(shape: &Shape, exterior: Option<MediumId>, media: &[Medium]) -> Surface {

@@ -2,26 +2,11 @@
 //! kernels something takes its line out here.
 
 use super::PackError;
-use crate::scene::{Bsdf, Geometry, Phase, Scene, Shape, Texture};
-use glam::DVec3;
+use crate::scene::{Bsdf, Geometry, Scene, Shape, Texture};
 
 /// Refuses the first thing that cannot be rendered; returns what is rendered in a simpler way, for people.
 pub fn check(scene: &Scene) -> Result<Vec<String>, PackError> {
     let unsupported = |what: &'static str, name: String| Err(PackError::Unsupported { what, name });
-    for medium in &scene.media {
-        let what = match medium.phase {
-            Phase::Isotropic | Phase::HenyeyGreenstein { .. } => None,
-            Phase::Rayleigh => Some("the Rayleigh phase function"),
-            Phase::Blend { .. } => Some("the blended phase function"),
-            Phase::Tabulated { .. } => Some("the tabulated phase function"),
-        };
-        if let Some(what) = what {
-            return unsupported(what, medium.name.clone());
-        }
-        if medium.emission != DVec3::ZERO {
-            return unsupported("the emission", medium.name.clone());
-        }
-    }
     let mut warnings = Vec::new();
     for shape in &scene.shapes {
         if let Some(what) = unsupported_bsdf(&shape.bsdf) {

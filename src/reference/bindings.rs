@@ -76,6 +76,7 @@ pub struct Medium {
     pub light: u32,
     pub least_sigma_t: f64,
     pub equiangular: f64,
+    pub collision_share: f64,
 }
 
 /// See [`layout::Light`].
@@ -195,6 +196,7 @@ impl From<&layout::Medium> for Medium {
             light: from.light,
             least_sigma_t: f64::from(from.least_sigma_t),
             equiangular: f64::from(from.equiangular),
+            collision_share: f64::from(from.collision_share),
         }
     }
 }

@@ -117,6 +117,34 @@ pub fn sphere_light_pdf(radius: f64, center_distance: f64) -> f64 {
     }
 }
 
+/// A point in the sphere about an emitting medium, from outside: its direction uniform over the cone, its distance over the
+/// chord. Nothing from inside.
+pub fn sample_volume_light(light: &Light, point: DVec3, u: DVec2, u_distance: f64) -> LightSample {
+    let to_center = light.origin - point;
+    let (radius, center_distance) = (light.edge_1.x, to_center.length());
+    if center_distance <= radius {
+        return LightSample::NOTHING;
+    }
+    let one_minus_cos = sphere_one_minus_cos(radius, center_distance);
+    let direction = from_frame(to_center / center_distance, square_to_cone(u, one_minus_cos));
+    let pdf = square_to_cone_pdf(one_minus_cos);
+    let along = to_center.dot(direction);
+    let closest = to_center - along * direction;
+    let half_chord = (radius * radius - closest.dot(closest)).max(0.0).sqrt();
+    let distance = (along + half_chord * (2.0 * u_distance - 1.0)).max(0.0);
+    LightSample { direction, distance, weight: light.radiance * (2.0 * half_chord / pdf), pdf }
+}
+
+/// Density per solid angle with which directions to that sphere are sampled: 0 from inside and past it.
+pub fn volume_light_pdf(light: &Light, point: DVec3, direction: DVec3) -> f64 {
+    let to_center = light.origin - point;
+    let (radius, center_distance) = (light.edge_1.x, to_center.length());
+    let along = to_center.dot(direction);
+    let closest = to_center - along * direction;
+    let met = center_distance > radius && along > 0.0 && closest.dot(closest) <= radius * radius;
+    if met { square_to_cone_pdf(sphere_one_minus_cos(radius, center_distance)) } else { 0.0 }
+}
+
 /// The one direction to a point.
 pub fn sample_point_light(light: &Light, point: DVec3) -> LightSample {
     let offset = light.origin - point;

@@ -59,3 +59,25 @@ pub fn medium_of_code(sum: u32, guess: u32, medium_count: u32) -> u32 {
     }
     (0..medium_count).find(|medium| sum == medium_code(*medium)).unwrap_or(u32::MAX)
 }
+
+/// Emission along a flight through a medium that adds 1 per unit of length, for gray media: `way` is how far it went there,
+/// `ended` whether it ended there and not at a boundary.
+pub fn emitting_length(share: f64, sigma_t: f64, way: f64, ended: bool) -> f64 {
+    (1.0 - share) * way + if ended { share / sigma_t } else { 0.0 }
+}
+
+/// The same for chromatic media: `tau` is the optical depth up to where the flight entered the medium, `way` how far it went
+/// there, `ended` whether it ended there, and `u` in \[0, 1) chooses the point that stands for the way.
+pub fn emitting_length_rgb(
+    share: f64,
+    weights: DVec3,
+    tau: DVec3,
+    sigma_t: DVec3,
+    way: f64,
+    ended: bool,
+    u: f64,
+) -> DVec3 {
+    let along = (1.0 - share) * way * survival_weight(weights, tau + sigma_t * (u * way));
+    let transmittance = exp_minus_rgb(tau + sigma_t * way);
+    along + if ended { share * transmittance / weights.dot(sigma_t * transmittance) } else { DVec3::ZERO }
+}

@@ -1,19 +1,19 @@
 //! Mirror of `shaders/lib/path.glsl`: the estimator, a path as a coroutine that asks for one ray at a time. A path's
 //! life is described there. What the kernel leaves out where a scene does not need it is always here.
 
-use super::bindings::{Surface, Tables};
+use super::bindings::{Medium, Surface, Tables};
 use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
 use super::math::{exp_minus_rgb, max_component, to_frame};
 use super::medium::channel_weights;
-use super::path_flight::{end_flight, enter_medium, flight_point, near_distance};
-use super::path_lights::{add_emission, add_sky, sample_light};
+use super::path_flight::{end_flight, enter_medium, flight_point, free_way, near_distance};
+use super::path_lights::{add_emission, add_medium_emission, add_sky, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_set, survived_throughput};
 use super::path_vertex::{Vertex, medium_towards, offset_origin, sample_scattering, surface_point};
 use super::ray::offset_distance;
-use crate::pack::layout::{PRIMITIVE_BOUNDARY, SURFACE_ORIENTED, SURFACE_TWO_SIDED};
+use crate::pack::layout::{LIGHT_VOLUME, PRIMITIVE_BOUNDARY, SURFACE_ORIENTED, SURFACE_TWO_SIDED};
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
 /// Depth at which roulette begins to end paths that lose nothing.
@@ -52,7 +52,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     }
     let u = sample_set(tables, path, 2 * path.segment + 1);
     let lobe = sample_set(tables, path, 2 * path.segment + 2).y;
-    let next = sample_scattering(vertex, u.zw(), lobe);
+    let next = sample_scattering(tables, vertex, u.zw(), lobe);
     path.point = vertex.point;
     path.t_min = 0.0;
     path.last = NONE;
@@ -96,12 +96,15 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
 
     let medium = *medium_at(tables, path.medium);
     let end = end_flight(tables, path, &medium, t, surface_hit);
+    let flown = if end.scatters { free_way(path, &medium) } else { t - path.t_min };
+    add_medium_emission(tables, path, &medium, flown, end.scatters);
     if end.scatters {
         let point = flight_point(tables, path, hit, end.way);
         path.offset = 0.0;
         path.normal = path.direction;
         let (axis, surface, incident) = (path.direction, Surface::default(), DVec3::ZERO);
-        let vertex = Vertex { point, axis, in_medium: true, g: medium.g, albedo: end.weight, surface, incident };
+        let Medium { g, phase, .. } = medium;
+        let vertex = Vertex { point, axis, in_medium: true, g, phase, albedo: end.weight, surface, incident };
         scatter(tables, path, &vertex);
     } else {
         // The optical depth of the way through the medium since `t_min`.
@@ -145,7 +148,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         scatter(
             tables,
             path,
-            &Vertex { point, axis, in_medium: false, g: 0.0, albedo: DVec3::ZERO, surface, incident },
+            &Vertex { point, axis, in_medium: false, g: 0.0, phase: 0, albedo: DVec3::ZERO, surface, incident },
         );
     }
     if !path.shadow && path.alive {
@@ -156,8 +159,14 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
 /// Answers a shadow ray.
 pub fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
     if !hit.blocked {
-        let transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
-        let survives = channel_weights(path.light_channels).dot(transmittance);
+        let mut transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
+        let mut survives = channel_weights(path.light_channels).dot(transmittance);
+        let light = &tables.lights[path.light as usize];
+        if light.kind == LIGHT_VOLUME {
+            // The point lies in the sphere about the medium, but perhaps not in the medium itself.
+            survives = 1.0;
+            transmittance *= f64::from(u8::from(f64::from(hit.medium) == light.edge_1.y));
+        }
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
     }
     path.shadow = false;

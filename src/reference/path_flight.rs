@@ -32,6 +32,11 @@ fn light_pivot(light: &Light, u: DVec2) -> Option<DVec3> {
     is_local(light).then_some(light.origin + offset)
 }
 
+/// How far the free flight gets in the medium from `t_min` on.
+pub fn free_way(path: &Path, medium: &Medium) -> f64 {
+    free_flight(path.tau_left, medium.sigma_t[path.channel as usize])
+}
+
 /// Where the flight ends on a ray that meets a surface at `t_end`, or nothing before `t_end`.
 pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, surface: bool) -> FlightEnd {
     let mut end =

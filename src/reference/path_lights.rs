@@ -1,18 +1,21 @@
 //! Mirror of `shaders/lib/path_lights.glsl`: how a path comes to light, by chance or by light sampling.
 
-use super::bindings::{Light, Primitive, Tables};
+use super::bindings::{Light, Medium, Primitive, Tables};
 use super::bsdf::BsdfSample;
 use super::light::{
     LightSample, area_pdf, sample_directional_light, sample_plane_light, sample_point_light, sample_sphere_light,
-    sample_spot_light, sphere_light_pdf,
+    sample_spot_light, sample_volume_light, sphere_light_pdf, volume_light_pdf,
 };
 use super::math::max_component;
-use super::path_state::{INFINITE_DISTANCE, Path, choose_light, survival, survived_throughput};
+use super::medium::{channel_weights, emitting_length, emitting_length_rgb};
+use super::path_state::{
+    EMISSION_SETS, INFINITE_DISTANCE, Path, choose_light, sample_set, survival, survived_throughput,
+};
 use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
 use super::sky::{SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
 use crate::pack::layout::{
     LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_TEXTURE_SHIFT,
-    Texture,
+    LIGHT_VOLUME, Texture,
 };
 use glam::{DVec2, DVec3};
 
@@ -82,6 +85,29 @@ pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: 
     path.radiance += survived_throughput(path) * light.radiance * weight;
 }
 
+/// Adds what a medium emits along the flight through it, from `t_min` on.
+pub fn add_medium_emission(tables: &Tables, path: &mut Path, medium: &Medium, way: f64, ended: bool) {
+    if max_component(medium.emission) == 0.0 || !emitters_seen(tables, path) {
+        return;
+    }
+    let (share, sigma_t) = (medium.collision_share, medium.sigma_t);
+    let length = if tables.features.chromatic {
+        let u = sample_set(tables, path, EMISSION_SETS + path.segment).x;
+        let weights = channel_weights(path.throughput);
+        emitting_length_rgb(share, weights, path.tau_rgb, sigma_t, way, ended, u)
+    } else {
+        DVec3::splat(emitting_length(share, sigma_t.x, way, ended))
+    };
+    let mut mis_weight = 1.0;
+    if tables.features.light_sampling && medium.light != 0 {
+        // Of the direction alone: whatever lies on the way, light sampling has the same density for all of its points.
+        let light = &tables.lights[medium.light as usize - 1];
+        let light_pdf = light.probability * volume_light_pdf(light, path.origin, path.direction);
+        mis_weight = scattering_mis_weight(tables, path, 1.0, light_pdf);
+    }
+    path.radiance += path.throughput * medium.emission * length * mis_weight;
+}
+
 /// Chooses a light and a point on it by `u`, and where a sampler has more to decide, by `decision`, and sets up the shadow ray. Returns whether there is anything to ask for.
 pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2, decision: DVec2) -> bool {
     if !tables.features.light_sampling {
@@ -93,9 +119,13 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
         LIGHT_CONSTANT => {
             // No direction is better than another, so the scattering function samples them; what light sampling adds is
             // the transmittance, exact instead of 0 or 1.
-            let BsdfSample { direction, pdf, .. } = sample_scattering(vertex, u, decision.x);
+            let BsdfSample { direction, pdf, .. } = sample_scattering(tables, vertex, u, decision.x);
             let weight = if pdf > 0.0 { light.radiance / pdf } else { DVec3::ZERO };
             LightSample { direction, distance: INFINITE_DISTANCE, weight, pdf }
+        }
+        LIGHT_VOLUME => {
+            let u_distance = sample_set(tables, path, EMISSION_SETS + path.segment).y;
+            sample_volume_light(light, vertex.point, u, u_distance)
         }
         LIGHT_POINT => sample_point_light(light, vertex.point),
         LIGHT_SPOT => sample_spot_light(light, vertex.point),
@@ -110,7 +140,7 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
             None => sample_plane_light(light, vertex.point, u),
         },
     };
-    let scattering = eval_scattering(vertex, found.direction);
+    let scattering = eval_scattering(tables, vertex, found.direction);
     path.direction = found.direction;
     path.t_max = found.distance;
     path.light = index;

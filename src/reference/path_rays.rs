@@ -25,8 +25,15 @@ pub fn depth_at_infinity(tables: &Tables, path: &Path) -> DVec3 {
 pub fn begin_hit(tables: &Tables, path: &Path) -> Hit {
     // Extension rays see a little beyond their flight: see `flight_point`.
     let t = if path.shadow { path.t_max } else { path.t_max + near_distance(path, path.t_max) };
-    let mut hit =
-        Hit { t, primitive: NONE, along_normal: false, barycentric: DVec2::ZERO, tau_rgb: DVec3::ZERO, blocked: false };
+    let mut hit = Hit {
+        t,
+        primitive: NONE,
+        along_normal: false,
+        barycentric: DVec2::ZERO,
+        tau_rgb: DVec3::ZERO,
+        blocked: false,
+        medium: path.light_medium,
+    };
     if path.shadow {
         hit.tau_rgb =
             medium_at(tables, path.light_medium).sigma_t * shadow_length(path) + depth_at_infinity(tables, path);
@@ -53,7 +60,12 @@ pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit:
         let counts = begins && t < path.t_max;
         if counts && boundary {
             let way = (shadow_length(path) - t) * if along_normal { -1.0 } else { 1.0 };
-            hit.tau_rgb += tables.surface_of(primitive).sigma_t_step * way;
+            let surface = tables.surface_of(primitive);
+            hit.tau_rgb += surface.sigma_t_step * way;
+            // In any order: the differences of indices add up.
+            let (inside, outside) = (surface.media & 0xffff, surface.media >> 16);
+            let (from, to) = if along_normal { (inside, outside) } else { (outside, inside) };
+            hit.medium = hit.medium.wrapping_add(to).wrapping_sub(from);
         }
         // The light itself is not in the way of its light.
         hit.blocked |= counts && !boundary && primitive.light != path.light + 1;

@@ -16,6 +16,9 @@ pub const INFINITE_DISTANCE: f64 = layout::INFINITE_DISTANCE as f64;
 /// More than the optical depth that any free flight gets.
 const MAX_FLIGHT_TAU: f64 = 16.7;
 
+/// Sets of the numbers that choose points of emission, one for each segment: beyond all others.
+pub const EMISSION_SETS: u32 = 0x8000_0000;
+
 /// A path between two rays.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Path {
@@ -102,6 +105,8 @@ pub struct Hit {
     pub tau_rgb: DVec3,
     /// Shadow rays: something is in the way.
     pub blocked: bool,
+    /// Shadow rays: the medium at the end of the ray.
+    pub medium: u32,
 }
 
 /// The four numbers of a set.

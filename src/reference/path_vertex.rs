@@ -5,7 +5,7 @@ use super::bsdf::{BsdfSample, BsdfValue, eval_bsdf, sample_bsdf};
 use super::math::{from_frame, max_component, to_frame};
 use super::medium::{medium_code, medium_of_code};
 use super::path_state::{Hit, NONE, Path};
-use super::phase::{eval_henyey_greenstein, sample_henyey_greenstein};
+use super::phase::{PhaseTables, eval_henyey_greenstein, eval_mixture, sample_henyey_greenstein, sample_mixture};
 use super::warp::from_polar;
 use crate::pack::layout::{PRIMITIVE_SPHERE, SURFACE_ORIENTED};
 use glam::{DVec2, DVec3};
@@ -21,6 +21,8 @@ pub struct Vertex {
     pub in_medium: bool,
     /// Of the medium.
     pub g: f64,
+    /// Of the medium: its mixture of phase functions, as in [`crate::pack::layout::Medium`]; 0 is the one of `g`.
+    pub phase: u32,
     /// Of the medium, with the weight of the flight.
     pub albedo: DVec3,
     /// What is there, if it is not in a medium.
@@ -29,23 +31,35 @@ pub struct Vertex {
     pub incident: DVec3,
 }
 
+fn phase_tables(tables: &Tables) -> PhaseTables<'_> {
+    PhaseTables { phases: &tables.phases, values: &tables.values }
+}
+
 /// Scattering function times cosine, and the density with which directions are sampled.
-pub fn eval_scattering(vertex: &Vertex, direction: DVec3) -> BsdfValue {
+pub fn eval_scattering(tables: &Tables, vertex: &Vertex, direction: DVec3) -> BsdfValue {
     if vertex.in_medium {
-        let phase = eval_henyey_greenstein(vertex.g, vertex.axis, direction);
+        let phase = if vertex.phase != 0 {
+            eval_mixture(phase_tables(tables), vertex.phase, vertex.axis, direction)
+        } else {
+            eval_henyey_greenstein(vertex.g, vertex.axis, direction)
+        };
         return BsdfValue { value: vertex.albedo * phase, pdf: phase };
     }
     eval_bsdf(&vertex.surface, vertex.incident, to_frame(vertex.axis, direction))
 }
 
 /// A direction found by scattering, in world space.
-pub fn sample_scattering(vertex: &Vertex, u: DVec2, lobe: f64) -> BsdfSample {
+pub fn sample_scattering(tables: &Tables, vertex: &Vertex, u: DVec2, lobe: f64) -> BsdfSample {
     if vertex.in_medium {
-        let angle = sample_henyey_greenstein(vertex.g, u.x);
+        let angle = if vertex.phase != 0 {
+            sample_mixture(phase_tables(tables), vertex.phase, u.x, lobe)
+        } else {
+            sample_henyey_greenstein(vertex.g, u.x)
+        };
         let local = from_polar(angle.cos_theta, angle.sin_theta, u.y);
         // For g = 0 no axis matters; the kernel leaves the frame out where it knows no other g.
-        let direction = if vertex.g == 0.0 { local } else { from_frame(vertex.axis, local) };
-        let pdf = eval_scattering(vertex, direction).pdf;
+        let direction = if vertex.g == 0.0 && vertex.phase == 0 { local } else { from_frame(vertex.axis, local) };
+        let pdf = eval_scattering(tables, vertex, direction).pdf;
         return BsdfSample { direction, weight: vertex.albedo, pdf, eta: 1.0 };
     }
     let found = sample_bsdf(&vertex.surface, vertex.incident, u, lobe);

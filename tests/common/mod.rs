@@ -4,6 +4,7 @@
 
 pub mod comparison;
 pub mod images;
+pub mod phases;
 pub mod random;
 pub mod scenes;
 pub mod statistics;

@@ -215,7 +215,7 @@ fn still_life(fog: bool) -> Scene {
 }
 
 /// A spot and parallel light, through fog that ends somewhere.
-pub fn spot_and_directional() -> Scene {
+fn spot_and_directional() -> Scene {
     let mut scene = still_life(true);
     let (position, direction) = (v(1.0, 1.5, 1.0), v(-0.8, -1.0, -0.7).normalize());
     let intensity = v(8.0, 6.0, 5.0);
@@ -247,6 +247,42 @@ pub fn all_lights() -> Scene {
     scene
 }
 
+/// Media with phase functions of all kinds, beside and in each other.
+pub fn mixed_phases() -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    walls(&mut scene);
+    scene.shapes.push(lamp());
+    let table = |values: &[f64]| Phase::tabulated(values.to_vec()).expect("a table");
+    let blend = |weight, a, b| Phase::Blend { weight, a: Box::new(a), b: Box::new(b) };
+    let inner = blend(0.3, Phase::HenyeyGreenstein { g: 0.6 }, table(&[2.0, 0.0, 1.0, 0.2, 0.0, 5.0]));
+    let three = blend(0.7, Phase::Rayleigh, inner);
+    let medium = |name, phase| Medium::new(name, v(2.0, 3.0, 5.0), v(0.9, 0.95, 0.8), phase);
+    let cases =
+        [("air", Phase::Rayleigh), ("cloud", table(&[1.0, 0.2, 0.0, 4.0])), ("blend", three), ("plain", phase(0.4))];
+    for (k, (name, phase)) in cases.into_iter().enumerate() {
+        let id = scene.add_medium(medium(name, phase));
+        let center = v(if k % 2 == 0 { -0.4 } else { 0.4 }, if k < 2 { -0.5 } else { 0.3 }, 0.1);
+        scene.shapes.push(Shape::boundary(name, ball(center, 0.35), id));
+    }
+    scene.lights.push(Light::Constant { radiance: v(0.2, 0.3, 0.4) });
+    scene
+}
+
+/// Media that glow: a gray one that scatters, a chromatic one in it, and one that is nothing but light, over a floor.
+pub fn glow() -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    walls(&mut scene);
+    let mut add = |name: &str, sigma_t, albedo, emission, center, radius| {
+        let medium = Medium { emission, ..Medium::new(name, sigma_t, albedo, phase(0.4)) };
+        let id = scene.add_medium(medium);
+        scene.shapes.push(Shape::boundary(name, ball(center, radius), id));
+    };
+    add("fire", v(2.0, 2.0, 2.0), DVec3::splat(0.8), v(3.0, 1.5, 0.4), v(-0.3, -0.3, 0.0), 0.5);
+    add("core", v(0.5, 3.0, 9.0), v(0.2, 0.6, 0.9), v(1.0, 4.0, 9.0), v(-0.3, -0.3, 0.1), 0.25);
+    add("light", DVec3::ZERO, DVec3::ZERO, v(0.5, 0.7, 1.0), v(0.5, 0.3, 0.0), 0.3);
+    scene
+}
+
 /// All scenes of this file, by name.
 pub fn all() -> Vec<(&'static str, Scene)> {
     vec![
@@ -255,9 +291,10 @@ pub fn all() -> Vec<(&'static str, Scene)> {
         ("furnace", furnace(cuboid(DMat4::IDENTITY), 3.0, 0.5)),
         ("point light", point_light()),
         ("sphere light", sphere_light()),
-        ("spot and directional", spot_and_directional()),
         ("environment map", envmap()),
         ("all lights", all_lights()),
+        ("mixed phases", mixed_phases()),
+        ("glow", glow()),
     ]
 }
 
