@@ -86,9 +86,10 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("light", &["math", "warp"]),
     ("medium", &["math"]),
     ("path_state", &["math", "sampler", "medium"]),
-    ("path_vertex", &["path_state", "warp", "ray", "phase", "bsdf"]),
+    ("path_surface", &["path_state", "texture"]),
+    ("path_vertex", &["path_state", "path_surface", "warp", "ray", "phase", "bsdf"]),
     ("path_lights", &["path_state", "path_vertex", "light"]),
-    ("path_rays", &["path_state", "ray"]),
+    ("path_rays", &["path_state", "path_surface", "ray"]),
     ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "camera"]),
 ];
 const ALL_MAY_INCLUDE: &[&str] = &["constants", "layout", "features", "sobol"];
@@ -148,7 +149,7 @@ fn every_concept_has_a_mirror_and_a_unit_kernel() {
     // The path and its bindings are tested as a whole, by images.
     assert_eq!(
         names("shaders/units", ".comp"),
-        without(concepts, &["path", "path_lights", "path_rays", "path_state", "path_vertex", "bindings"]),
+        without(concepts, &["path", "path_lights", "path_rays", "path_state", "path_surface", "path_vertex", "bindings"]),
         "unit kernels of concepts"
     );
 }

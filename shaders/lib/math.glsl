@@ -29,6 +29,20 @@ vec3 exp_minus(vec3 x) {
     return vec3(exp_minus(x.x), exp_minus(x.y), exp_minus(x.z));
 }
 
+// The angle of the point (x, y), in [-pi, pi], with a relative error below 4e-7; 0 at the origin. The tangent is reduced to one below
+// tan(pi/8), for which Cephes' (Moshier 1989) polynomial holds.
+float atan2(float y, float x) {
+    float low = min(abs(x), abs(y)), high = max(abs(x), abs(y));
+    bool reduced = low > 0.41421357 * high;
+    float t = reduced ? (low - high) / (low + high) : low / max(high, 1e-37);
+    float z = t * t;
+    float angle = t + t * z * (-0.33332949 + z * (0.19977711 + z * (-0.13877685 + z * 0.080537444)));
+    angle = reduced ? 0.78539819 + angle : angle;
+    angle = abs(y) > abs(x) ? 1.5707964 - angle : angle;
+    angle = x < 0.0 ? 3.1415927 - angle : angle;
+    return y < 0.0 ? -angle : angle;
+}
+
 // Two unit vectors that make up a right-handed frame with the unit vector n: tangent x bitangent = n (Duff et al. 2017).
 void orthonormal_frame(vec3 n, out vec3 tangent, out vec3 bitangent) {
     float side = n.z >= 0.0 ? 1.0 : -1.0;

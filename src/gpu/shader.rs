@@ -33,11 +33,13 @@ sources! {
     "lib/path_lights.glsl",
     "lib/path_rays.glsl",
     "lib/path_state.glsl",
+    "lib/path_surface.glsl",
     "lib/path_vertex.glsl",
     "lib/phase.glsl",
     "lib/ray.glsl",
     "lib/rng.glsl",
     "lib/sampler.glsl",
+    "lib/texture.glsl",
     "lib/warp.glsl",
     "units/bsdf.comp",
     "units/bvh.comp",
@@ -50,6 +52,7 @@ sources! {
     "units/ray.comp",
     "units/rng.comp",
     "units/sampler.comp",
+    "units/texture.comp",
     "units/warp.comp",
 }
 

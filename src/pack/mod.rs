@@ -1,6 +1,6 @@
 //! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
 
-use crate::scene::{self, Bsdf, Geometry, MediumId, Scene, Shape};
+use crate::scene::{self, Geometry, MediumId, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
@@ -12,6 +12,7 @@ pub mod material;
 pub mod nesting;
 pub mod sobol;
 mod support;
+pub mod texture;
 
 use bvh::Bvh;
 use features::Features;
@@ -19,6 +20,7 @@ use frame::Frame;
 use layout::*;
 use lights::LightTable;
 use nesting::Nesting;
+use texture::TextureTable;
 
 /// A scene as tables.
 #[derive(Clone, Debug)]
@@ -70,6 +72,20 @@ pub enum PackError {
         /// Its value.
         value: f64,
     },
+    /// More textures than a surface can name.
+    #[error("{0} textures are more than the {max} that a scene can hold", max = texture::MAX_TEXTURES)]
+    TooManyTextures(usize),
+    /// More pixels and other numbers than an index can reach.
+    #[error("{0} numbers of images and tables are more than a scene can hold")]
+    TooManyValues(usize),
+    /// A surface that depends on the place, but does not say where its places are.
+    #[error("\"{name}\" has {why}, but no texture coordinates")]
+    MissingUvs {
+        /// What needs them.
+        why: &'static str,
+        /// Of which shape.
+        name: String,
+    },
     /// Part of a scene that kernels cannot render yet.
     #[error("{what} of \"{name}\" cannot be rendered yet")]
     Unsupported {
@@ -96,10 +112,25 @@ impl Packed {
         let mut surfaces = Vec::with_capacity(scene.shapes.len());
         let mut primitives = Vec::new();
         let mut lights = LightTable::default();
+        let (mut textures, mut values) = (TextureTable::default(), Vec::new());
+        let mut corners = Vec::new();
         for (index, shape) in scene.shapes.iter().enumerate() {
-            let surface = pack_surface(shape, nesting.exteriors[index], &media);
+            let surface = pack_surface(shape, nesting.exteriors[index], &media, &mut textures, &mut values);
+            let first = primitives.len();
             pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights);
+            if surface.flags & (SURFACE_SMOOTH | SURFACE_UVS) != 0 {
+                corners.resize(first, Corners::default());
+                corners.extend(texture::corners(shape));
+                assert_eq!(corners.len(), primitives.len(), "one entry for each primitive");
+            }
             surfaces.push(surface);
+        }
+        let textures = textures.textures;
+        if textures.len() > texture::MAX_TEXTURES {
+            return Err(PackError::TooManyTextures(textures.len()));
+        }
+        if u32::try_from(values.len()).is_err() {
+            return Err(PackError::TooManyValues(values.len()));
         }
         if primitives.len() > bvh::MAX_PRIMITIVES {
             return Err(PackError::TooManyPrimitives(primitives.len()));
@@ -107,7 +138,12 @@ impl Packed {
         for light in &scene.lights {
             lights.add(light, &frame);
         }
-        let (bvh, primitives) = Bvh::new(&primitives);
+        let (bvh, order) = Bvh::with_order(&primitives);
+        if !corners.is_empty() {
+            corners.resize(primitives.len(), Corners::default());
+            corners = order.iter().map(|&index| corners[index as usize]).collect();
+        }
+        let primitives: Vec<Primitive> = order.iter().map(|&index| primitives[index as usize]).collect();
         let lights = lights.finish();
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
         params = Params {
@@ -123,7 +159,7 @@ impl Packed {
         };
         let warnings = [nesting.warnings, simplified].concat();
         let features = EMPTY_FEATURES;
-        let (phases, corners, textures, values) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let phases = Vec::new();
         let mut packed = Packed {
             frame,
             bvh,
@@ -165,6 +201,11 @@ const EMPTY_FEATURES: Features = Features {
     dielectric: false,
     conductor: false,
     plastic: false,
+    rough_plastic: false,
+    textures: false,
+    anisotropic: false,
+    shading_normals: false,
+    masks: false,
     far_clip: false,
     hide_emitters: false,
     light_sampling: false,
@@ -202,15 +243,26 @@ fn nearest_below_one(g: f64) -> f32 {
     (g as f32).clamp(-most, most)
 }
 
-fn pack_surface(shape: &Shape, exterior: Option<MediumId>, media: &[Medium]) -> Surface {
+fn pack_surface(
+    shape: &Shape,
+    exterior: Option<MediumId>,
+    media: &[Medium],
+    textures: &mut TextureTable,
+    values: &mut Vec<f32>,
+) -> Surface {
     let (inside, outside) = match shape.boundary {
         Some(boundary) => (medium_index(boundary.interior), medium_index(exterior)),
         None => (0, 0),
     };
+    let material = material::pack(&shape.bsdf, textures, values);
+    let smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
+    let smooth = if smooth && !material::is_null(&shape.bsdf) { SURFACE_SMOOTH } else { 0 };
+    let uvs = if shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };
     Surface {
+        flags: material.flags | smooth | uvs,
         sigma_t_step: media[inside as usize].sigma_t - media[outside as usize].sigma_t,
         media: inside | outside << 16,
-        ..material::pack(&shape.bsdf)
+        ..material
     }
 }
 
@@ -223,7 +275,7 @@ fn pack_shape(
     primitives: &mut Vec<Primitive>,
     lights: &mut LightTable,
 ) {
-    let crossed = shape.bsdf == Bsdf::Null;
+    let crossed = material::is_null(&shape.bsdf);
     if crossed && shape.boundary.is_none() && shape.emission.is_none() {
         return; // Neither seen nor felt.
     }

@@ -2,7 +2,7 @@
 //! kernels something takes its line out here.
 
 use super::PackError;
-use crate::scene::{Bsdf, Geometry, Light, Phase, Scene, Shape, Texture};
+use crate::scene::{Bsdf, Geometry, Light, Phase, Scene};
 use glam::DVec3;
 
 /// Refuses the first thing that cannot be rendered; returns what is rendered in a simpler way, for people.
@@ -31,17 +31,14 @@ pub fn check(scene: &Scene) -> Result<Vec<String>, PackError> {
         };
         return unsupported(what, format!("emitter {}", index + 1));
     }
-    let mut warnings = Vec::new();
+    let warnings = Vec::new();
     for shape in &scene.shapes {
         if let Some(what) = unsupported_bsdf(&shape.bsdf) {
             return unsupported(what, shape.name.clone());
         }
-        if shape.bsdf != Bsdf::Null && has_normals(shape) {
-            warnings.push(format!(
-                "flat normals are used for \"{}\", not its vertex normals; add <boolean name=\"face_normals\" \
-                 value=\"true\"/> for the same picture in Mitsuba",
-                shape.name
-            ));
+        let bare = matches!(&shape.geometry, Geometry::Mesh(mesh) if mesh.uvs.is_empty());
+        if let (true, Some(why)) = (bare, shape.bsdf.needs_uvs()) {
+            return Err(PackError::MissingUvs { why, name: shape.name.clone() });
         }
     }
     Ok(warnings)
@@ -49,18 +46,7 @@ pub fn check(scene: &Scene) -> Result<Vec<String>, PackError> {
 
 fn unsupported_bsdf(bsdf: &Bsdf) -> Option<&'static str> {
     match bsdf {
-        Bsdf::RoughPlastic { .. } => Some("the roughplastic BSDF"),
-        Bsdf::Mask { .. } => Some("the mask BSDF"),
-        Bsdf::RoughDielectric { roughness, .. } | Bsdf::RoughConductor { roughness, .. }
-            if roughness.is_anisotropic() =>
-        {
-            Some("the anisotropic roughness")
-        }
-        _ if bsdf.textures().iter().any(|texture| !matches!(texture, Texture::Constant(_))) => Some("the texture"),
+        Bsdf::Mask { nested, .. } if matches!(**nested, Bsdf::Mask { .. }) => Some("the mask inside of a mask"),
         _ => None,
     }
-}
-
-fn has_normals(shape: &Shape) -> bool {
-    matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty())
 }

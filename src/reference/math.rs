@@ -17,6 +17,12 @@ pub fn exp_minus_rgb(x: DVec3) -> DVec3 {
     DVec3::new(exp_minus(x.x), exp_minus(x.y), exp_minus(x.z))
 }
 
+/// The angle of the point (x, y), in \[−π, π\]; 0 at the origin.
+pub fn atan2(y: f64, x: f64) -> f64 {
+    // Of a negative zero the kernel knows no sign.
+    if y == 0.0 && x >= 0.0 { 0.0 } else { (y + 0.0).atan2(x) }
+}
+
 /// Two unit vectors (tangent, bitangent) that make up a right-handed frame with the unit vector n: tangent × bitangent
 /// = n (Duff et al. 2017).
 pub fn orthonormal_frame(n: DVec3) -> (DVec3, DVec3) {

@@ -67,7 +67,7 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
         LIGHT_CONSTANT => {
             // No direction is better than another, so the scattering function samples them; what light sampling adds is
             // the transmittance, exact instead of 0 or 1.
-            let BsdfSample { direction, pdf, .. } = sample_scattering(vertex, u, lobe);
+            let BsdfSample { direction, pdf, .. } = sample_scattering(tables, vertex, u, lobe);
             let weight = if pdf > 0.0 { light.radiance / pdf } else { DVec3::ZERO };
             LightSample { direction, distance: INFINITE_DISTANCE, weight, pdf }
         }
@@ -75,7 +75,7 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
         LIGHT_SPHERE => sample_sphere_light(light, vertex.point, u),
         _ => sample_plane_light(light, vertex.point, u),
     };
-    let scattering = eval_scattering(vertex, found.direction);
+    let scattering = eval_scattering(tables, vertex, found.direction);
     path.direction = found.direction;
     path.t_max = found.distance;
     path.light = index;
