@@ -157,24 +157,17 @@ pub const COAT_ENTRIES: usize = 64;
 impl Coat {
     /// For a relative index, the one inside over that outside. The roughness has no direction.
     pub fn new(roughness: &Roughness, eta: f64) -> Coat {
-        let facets = |cosine: f64| VisibleFacets::new(roughness, cosine);
-        let transmittance = (0..COAT_ENTRIES)
-            .map(|entry| {
-                // Light that grazes exactly is taken as light that nearly does.
-                let cosine = (entry as f64 / (COAT_ENTRIES - 1) as f64).max(1e-6);
-                facets(cosine).mean(|facets, m| facets.transmitted(m, eta)) as f32
-            })
-            .collect();
-        // 2 ∫ R(cos) cos dcos by the midpoint rule in √cos, as `diffuse_fresnel`.
-        const STEPS: u32 = 48;
-        let internal: f64 = (0..STEPS)
-            .map(|step| {
-                let x = (f64::from(step) + 0.5) / f64::from(STEPS);
-                let cosine = x * x;
-                facets(cosine).mean(|facets, m| facets.reflected(m, 1.0 / eta)) * cosine * 4.0 * x
-            })
-            .sum();
-        Coat { transmittance, internal_reflectance: (internal / f64::from(STEPS)) as f32 }
+        let (mut transmittance, mut internal) = (Vec::new(), 0.0);
+        for entry in 0..COAT_ENTRIES {
+            // Light that grazes exactly is taken as light that nearly does.
+            let cosine = (entry as f64 / (COAT_ENTRIES - 1) as f64).max(1e-6);
+            let facets = VisibleFacets::new(roughness, cosine);
+            transmittance.push(facets.mean(|facets, m| facets.transmitted(m, eta)) as f32);
+            internal += 2.0 * cosine * facets.mean(|facets, m| facets.reflected(m, 1.0 / eta));
+        }
+        // 2 ∫ R(cos) cos dcos as the plain mean over the entries, with both ends, as Mitsuba 3.9.1 has it: 1.5 % below the integral, so
+        // that a white body seems a little darker. The integral itself would not give the same pictures.
+        Coat { transmittance, internal_reflectance: (internal / COAT_ENTRIES as f64) as f32 }
     }
 }
 
