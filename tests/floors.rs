@@ -149,7 +149,10 @@ fn every_concept_has_a_mirror_and_a_unit_kernel() {
     // The path and its bindings are tested as a whole, by images.
     assert_eq!(
         names("shaders/units", ".comp"),
-        without(concepts, &["path", "path_lights", "path_rays", "path_state", "path_surface", "path_vertex", "bindings"]),
+        without(
+            concepts,
+            &["path", "path_lights", "path_rays", "path_state", "path_surface", "path_vertex", "bindings"]
+        ),
         "unit kernels of concepts"
     );
 }

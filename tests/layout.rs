@@ -238,7 +238,7 @@ fn both_forms_of_every_kernel_render_the_same_image() {
             rendered += 1;
         }
     }
-    assert_eq!(rendered, 7);
+    assert_eq!(rendered, scenes::all().len() + 2);
 }
 
 #[test]

@@ -77,17 +77,25 @@ fn elementary_functions() {
         let x = if k < extremes.len() { extremes[k] } else { random.log_between(1e-12, 87.0) };
         let axes = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Z, v(1e-4, 0.0, -1.0), v(0.0, 1e-20, -1.0)];
         let n = if k < axes.len() { axes[k] } else { random.direction() };
-        inputs.extend([vec4(&[u, x]), vec4(&n.to_array())]);
+        // Points near and on the axes and diagonals, and others.
+        let mut point = [random.between(-1.0, 1.0), random.between(-1.0, 1.0)];
+        if k % 3 == 0 {
+            point = [0.0, 1.0, -1.0, 1e-7, -1e-7, 0.41421357].map(|a| [a, point[0].signum()])[k / 3 % 6];
+        }
+        inputs.extend([vec4(&[u, x, point[k % 2], point[(k + 1) % 2]]), vec4(&n.to_array())]);
     }
     let outputs: Vec<[f32; 4]> = run("math", &inputs, &[], inputs.len() / 2, inputs.len() / 2 * 3);
     let mut log = comparison("minus_log_1m");
     let mut exp = comparison("exp_minus");
+    let mut angle = comparison("atan2");
     let mut frame = comparison("orthonormal_frame");
     for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
         let [u, x] = [input[0][0], input[0][1]].map(f64::from);
         log.scalar(u, output[0][0], math::minus_log_1m(u));
         // What lies below the smallest normal number is 0.
         exp.scalar(x, output[0][1], math::exp_minus(x));
+        let point = [input[0][2], input[0][3]].map(f64::from);
+        angle.scalar(format!("{point:?}"), output[0][2], math::atan2(point[0], point[1]));
         let n = widen(&input[1][..3]);
         let (tangent, bitangent) = math::orthonormal_frame(n);
         frame.vector(n, &output[1][..3], tangent);
@@ -96,6 +104,7 @@ fn elementary_functions() {
     }
     log.finish();
     exp.finish();
+    angle.finish();
     frame.finish();
 }
 

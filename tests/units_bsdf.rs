@@ -187,7 +187,10 @@ fn facets_and_fresnel() {
             let moved: Vec<DVec3> = nudged(query.wi)
                 .map(|wi| sample_facet(wi, u, alpha, ggx))
                 .chain([-2.4e-7, 2.4e-7].map(|step| sample_facet(query.wi, DVec2::new(u.x, u.y + step), alpha, ggx)))
-                .chain([-1.2e-7, 1.2e-7].map(|step| sample_facet(query.wi, DVec2::new(u.x * (1.0 + step), u.y), alpha, ggx)))
+                .chain(
+                    [-1.2e-7, 1.2e-7]
+                        .map(|step| sample_facet(query.wi, DVec2::new(u.x * (1.0 + step), u.y), alpha, ggx)),
+                )
                 .collect();
             functions.near_vector("sample_facet", &case, answer.facet, expected, &moved);
             // Of the facet that the kernel found: rounding it is not an error of the function.
@@ -207,7 +210,7 @@ fn facets_and_fresnel() {
 
 #[test]
 fn surfaces_scatter_as_the_reference() {
-    let (surfaces, values) = (surfaces(), values());
+    let (surfaces, table) = (surfaces(), values());
     let queries = queries(&surfaces);
     let names = ["eval_bsdf value", "eval_bsdf pdf", "sample_bsdf direction", "sample_bsdf pdf", "sample_bsdf weight"];
     let mut functions = Functions::new(&names);
@@ -220,30 +223,34 @@ fn surfaces_scatter_as_the_reference() {
         // Both directions moved by the rounding of single precision.
         let around = |wo: DVec3| {
             let pairs = nudged(wi).map(|wi| (wi, wo)).chain(nudged(wo).map(|wo| (wi, wo)));
-            let value = eval_bsdf(&surface, &values, wi, wo);
+            let value = eval_bsdf(&surface, &table, wi, wo);
             let factor = 1.0 + refracted(&surface, wi, wo);
             let dimmed = BsdfValue { value: value.value * factor, pdf: value.pdf * factor };
             // Value and density may lose of it separately.
             let apart = BsdfValue { value: value.value * factor, pdf: value.pdf / factor };
-            pairs.map(|(wi, wo)| eval_bsdf(&surface, &values, wi, wo)).chain([dimmed, apart]).collect::<Vec<_>>()
+            pairs.map(|(wi, wo)| eval_bsdf(&surface, &table, wi, wo)).chain([dimmed, apart]).collect::<Vec<_>>()
         };
-        let (asked, moved) = (eval_bsdf(&surface, &values, wi, wo), around(wo));
+        let (asked, moved) = (eval_bsdf(&surface, &table, wi, wo), around(wo));
         let values: Vec<DVec3> = moved.iter().map(|moved| moved.value).collect();
         let pdfs: Vec<f64> = moved.iter().map(|moved| moved.pdf).collect();
         functions.near_vector("eval_bsdf value", &case, answer.value, asked.value, &values);
         functions.near("eval_bsdf pdf", &case, answer.value_pdf, asked.pdf, &pdfs);
 
-        let found = sample_bsdf(&surface, &values, wi, u, lobe);
+        let found = sample_bsdf(&surface, &table, wi, u, lobe);
         let turned = [-2.4e-7, 2.4e-7].map(|step| DVec2::new(u.x, u.y + step));
         let moved: Vec<_> = nudged(wi)
-            .map(|wi| sample_bsdf(&surface, &values, wi, u, lobe))
-            .chain(turned.map(|u| sample_bsdf(&surface, &values, wi, u, lobe)))
+            .map(|wi| sample_bsdf(&surface, &table, wi, u, lobe))
+            .chain(turned.map(|u| sample_bsdf(&surface, &table, wi, u, lobe)))
             .chain([-4e-6, 4e-6].map(|step| {
                 // The tangent of the facet, whose error sample_facet declares.
-                let other = bindings::Surface { alpha: surface.alpha * (1.0 + step), alpha_v: surface.alpha_v * (1.0 + step), ..surface };
-                sample_bsdf(&other, &values, wi, u, lobe)
+                let other = bindings::Surface {
+                    alpha: surface.alpha * (1.0 + step),
+                    alpha_v: surface.alpha_v * (1.0 + step),
+                    ..surface
+                };
+                sample_bsdf(&other, &table, wi, u, lobe)
             }))
-            .chain([-1e-6, 1e-6].map(|step| sample_bsdf(&surface, &values, wi, u, lobe + step)))
+            .chain([-1e-6, 1e-6].map(|step| sample_bsdf(&surface, &table, wi, u, lobe + step)))
             .collect();
         // At the border of two lobes, or of failure, either is right.
         let vanishes = found.pdf > 0.0 && around(found.direction).iter().any(|moved| moved.pdf <= 0.0);
@@ -260,7 +267,7 @@ fn surfaces_scatter_as_the_reference() {
         assert_eq!(answer.pdf > 0.0, found.pdf > 0.0, "{case}: {answer:?}, expected {found:?}");
         if found.pdf > 0.0 {
             // Of the direction that the kernel found.
-            let (expected, moved) = (eval_bsdf(&surface, &values, wi, answer.wo()), around(answer.wo()));
+            let (expected, moved) = (eval_bsdf(&surface, &table, wi, answer.wo()), around(answer.wo()));
             let weights: Vec<DVec3> =
                 moved.iter().filter(|moved| moved.pdf > 0.0).map(|moved| moved.value / moved.pdf).collect();
             let pdfs: Vec<f64> = moved.iter().map(|moved| moved.pdf).collect();

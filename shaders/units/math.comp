@@ -1,4 +1,5 @@
-// Unit kernel of lib/math.glsl: (u, x, 0, 0), (unit vector, 0) in; (-log(1 - u), exp(-x), 0, 0), tangent, bitangent out.
+// Unit kernel of lib/math.glsl: (u, x, y, x of a point), (unit vector, 0) in; (-log(1 - u), exp(-x), the point's angle, 0),
+// tangent, bitangent out.
 #version 460
 #include "lib/math.glsl"
 
@@ -11,7 +12,7 @@ void main() {
     if (i < uint(inputs.length()) / 2u) {
         vec3 tangent, bitangent;
         orthonormal_frame(inputs[2u * i + 1u].xyz, tangent, bitangent);
-        outputs[3u * i] = vec4(minus_log_1m(inputs[2u * i].x), exp_minus(inputs[2u * i].y), 0.0, 0.0);
+        outputs[3u * i] = vec4(minus_log_1m(inputs[2u * i].x), exp_minus(inputs[2u * i].y), atan2(inputs[2u * i].z, inputs[2u * i].w), 0.0);
         outputs[3u * i + 1u] = vec4(tangent, 0.0);
         outputs[3u * i + 2u] = vec4(bitangent, 0.0);
     }

@@ -284,7 +284,11 @@ pub fn sample_bsdf(surface: &Surface, values: &[f32], wi: DVec3, u: DVec2, lobe:
         if lobe >= p {
             found.direction = square_to_cosine_hemisphere(u);
         } else if surface.alpha == 0.0 {
-            return BsdfSample { direction: reflect_z(wi), weight: surface.specular * ((1.0 - through) / p), ..NO_SAMPLE };
+            return BsdfSample {
+                direction: reflect_z(wi),
+                weight: surface.specular * ((1.0 - through) / p),
+                ..NO_SAMPLE
+            };
         } else {
             let m = sample_facet(wi, u, roughness(surface), is_ggx(surface));
             found.direction = 2.0 * wi.dot(m) * m - wi;

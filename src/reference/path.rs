@@ -10,16 +10,12 @@ use super::path_lights::{add_constant_light, add_emission, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_set, survived_throughput};
-use super::path_surface::{
-    Place, apply_textures, opacity_at, shading_normal, surface_tangent, texture_coordinates,
-};
+use super::path_surface::{Place, apply_textures, opacity_at, shading_normal, surface_tangent, texture_coordinates};
 use super::path_vertex::{
     Vertex, medium_towards, offset_origin, sample_scattering, sides_agree, surface_point, to_surface_frame,
 };
 use super::ray::offset_distance;
-use crate::pack::layout::{
-    PRIMITIVE_BOUNDARY, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
-};
+use crate::pack::layout::{PRIMITIVE_BOUNDARY, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SMOOTH, SURFACE_TWO_SIDED};
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
 /// Depth at which roulette begins to end paths that lose nothing.

@@ -144,7 +144,8 @@ pub fn ask(surfaces: &[Surface], queries: &[Query]) -> Vec<Answer> {
         })
         .collect();
     let table = bytemuck::cast_slice(surfaces);
-    let outputs: Vec<[f32; 4]> = run("bsdf", &inputs, &[table, bytemuck::cast_slice(&values())], queries.len(), 6 * queries.len());
+    let outputs: Vec<[f32; 4]> =
+        run("bsdf", &inputs, &[table, bytemuck::cast_slice(&values())], queries.len(), 6 * queries.len());
     let three = |vector: [f32; 4]| [vector[0], vector[1], vector[2]];
     let answer = |output: &[[f32; 4]]| Answer {
         direction: three(output[0]),
