@@ -176,7 +176,7 @@ fn masks_keep_what_they_do_not_reflect() {
     // A black mask before a sky of 1 lets 1 - opacity through, and a lamp behind one shines on the floor through it just as on
     // the sampled way: both ways of finding it share their weights with the mask in between.
     let floor_under_lamp = |opacity: Option<f64>| {
-        let mut scene = Scene::new(Camera::look_at(v(0.0, 0.3, 3.0), DVec3::ZERO, DVec3::Y, 20.0), Film::new(16, 16));
+        let mut scene = scenes::one_ray(v(0.0, 0.3, 3.0), v(0.0, -0.2, 0.0), 16);
         let level = |height: f64, side: f64| {
             scenes::quad(v(-side, height, side), DVec3::X * 2.0 * side, DVec3::NEG_Z * 2.0 * side)
         };
@@ -191,7 +191,7 @@ fn masks_keep_what_they_do_not_reflect() {
         scene.integrator.max_depth = Some(2);
         scenes::pack(&scene, 6)
     };
-    let bare = images::average(&images::on_device(&floor_under_lamp(None), 512)).x;
+    let bare = images::average(&images::on_device(&floor_under_lamp(None), 2048)).x;
     is_one("lamp behind a veil", &floor_under_lamp(Some(0.4)), 0.6 * bare);
 }
 
@@ -211,7 +211,7 @@ fn shading_normals_reflect_as_a_sphere_and_leak_nothing() {
     let distance =
         |image: &images::Image| image.iter().zip(&sphere).map(|(a, b)| (a.x / b.x - 1.0).abs()).fold(0.0, f64::max);
     eprintln!("smooth {:.4}, flat {:.4}", distance(&smooth), distance(&flat));
-    assert!(distance(&smooth) < 0.03 && distance(&flat) > 0.06);
+    assert!(distance(&smooth) < 0.06 && distance(&flat) > 0.3);
 
     let mut scene = Scene::new(Camera::look_at(v(0.0, 0.0, 0.5), DVec3::ZERO, DVec3::Y, 60.0), Film::new(8, 8));
     scene.shapes.push(Shape::diffuse("ball", scenes::smooth_ball(0, DVec3::ZERO, 1.0), DVec3::splat(0.9)));
