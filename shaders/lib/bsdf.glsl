@@ -97,10 +97,12 @@ vec3 sample_facet(vec3 w, vec2 u, vec2 alpha, bool ggx) {
     }
     vec3 v = normalize(vec3(alpha * w.xy, w.z));
     v = w.z < 0.0 ? -v : v;
-    // A point of the cap z > -v.z of the unit sphere, uniformly; 1 - z is d. The normal is half way to v, and its z has no cancellation.
-    float d = u.x * (1.0 + v.z);
-    vec3 cap = from_polar(1.0 - d, sqrt(max(d * (2.0 - d), 0.0)), u.y);
-    return normalize(vec3(alpha * (cap.xy + v.xy), (1.0 + v.z) * (1.0 - u.x)));
+    // A point of the cap z > -v.z of the unit sphere, uniformly; 1 - z is `down` and 1 + z is `up`, neither with cancellation. The
+    // normal is half way to v.
+    float height = 1.0 + v.z;
+    float down = u.x * height, up = (1.0 - u.x) * height + dot(v.xy, v.xy) / height;
+    vec3 cap = from_polar(1.0 - down, sqrt(down * up), u.y);
+    return normalize(vec3(alpha * (cap.xy + v.xy), height * (1.0 - u.x)));
 }
 
 // Density of sample_facet, [1/sr]: of the facets that w sees D G1(w) |w.m| / |w.z| (Heitz 2014, equation 15), else D m.z.

@@ -109,9 +109,10 @@ pub fn sample_facet(w: DVec3, u: DVec2, alpha: DVec2, ggx: bool) -> DVec3 {
     }
     let v = (alpha * w.truncate()).extend(w.z).normalize();
     let v = if w.z < 0.0 { -v } else { v };
-    let d = u.x * (1.0 + v.z);
-    let cap = from_polar(1.0 - d, (d * (2.0 - d)).max(0.0).sqrt(), u.y);
-    (alpha * (cap + v).truncate()).extend((1.0 + v.z) * (1.0 - u.x)).normalize()
+    let height = 1.0 + v.z;
+    let (down, up) = (u.x * height, (1.0 - u.x) * height + v.truncate().length_squared() / height);
+    let cap = from_polar(1.0 - down, (down * up).sqrt(), u.y);
+    (alpha * (cap + v).truncate()).extend(height * (1.0 - u.x)).normalize()
 }
 
 /// Density of [`sample_facet`], 1/sr (Heitz 2014, equation 15).
