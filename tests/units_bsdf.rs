@@ -188,8 +188,9 @@ fn facets_and_fresnel() {
                 .map(|wi| sample_facet(wi, u, alpha, ggx))
                 .chain([-2.4e-7, 2.4e-7].map(|step| sample_facet(query.wi, DVec2::new(u.x, u.y + step), alpha, ggx)))
                 .chain(
-                    [-1.2e-7, 1.2e-7]
-                        .map(|step| sample_facet(query.wi, DVec2::new((u.x * (1.0 + step)).min(LAST), u.y), alpha, ggx)),
+                    [-1.2e-7, 1.2e-7].map(|step| {
+                        sample_facet(query.wi, DVec2::new((u.x * (1.0 + step)).min(LAST), u.y), alpha, ggx)
+                    }),
                 )
                 .collect();
             functions.near_vector("sample_facet", &case, answer.facet, expected, &moved);
