@@ -151,7 +151,7 @@ fn rough_surfaces_draw_what_their_densities_say() {
         }
         let (albedo, error) = mean_and_error(&energy);
         // What facets shadow is lost, and under a rough varnish twice.
-        let least = if name.starts_with("rough plastic") { 0.4 } else { 0.5 };
+        let least = if name.starts_with("rough plastic") { 0.35 } else { 0.5 };
         assert!(albedo > least && albedo <= 1.0 + 4.0 * error, "{name}: it reflects and transmits {albedo} ± {error}");
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
