@@ -6,7 +6,7 @@ use common::images;
 use common::random::Random;
 use common::scenes::{self, v};
 use common::statistics::{chi_squared_tail, mean_and_error};
-use common::surfaces::{Answer, Query, ask, glass, metal, plastic, single};
+use common::surfaces::{Answer, Query, ask, brushed, glass, metal, plastic, rough_plastic, single, values};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use tyndall::pack::Packed;
@@ -112,6 +112,10 @@ fn rough_surfaces() -> Vec<(String, Surface, f64)> {
                 all.push((name("glass from inside"), glass(alpha, ggx), -cosine));
                 all.push((name("metal"), metal(alpha, ggx), cosine));
                 all.push((name("plastic"), plastic(alpha, ggx), cosine));
+                all.push((name("rough plastic"), rough_plastic(alpha, ggx), cosine));
+                all.push((name("brushed metal"), brushed(metal(alpha, ggx), 0.25), cosine));
+                all.push((name("glass brushed from outside"), brushed(glass(alpha, ggx), 0.25), cosine));
+                all.push((name("glass brushed from inside"), brushed(glass(alpha, ggx), 0.25), -cosine));
             }
         }
     }
@@ -129,7 +133,7 @@ fn rough_surfaces_draw_what_their_densities_say() {
             Ok(probability) => eprintln!("{name}: probability {probability:.3}"),
             Err(why) => wrong.push(format!("{name}: {why}")),
         }
-        let rougher = Surface { alpha: surface.alpha * 1.5, ..surface };
+        let rougher = Surface { alpha: surface.alpha * 1.5, alpha_v: surface.alpha_v * 1.5, ..surface };
         check_histogram(&counts, &integrals(&rougher, wi)).expect_err("the density of a rougher surface");
         // Weights are value over density, and both are those that are asked for.
         let again: Vec<Query> = samples.iter().map(|(query, answer)| Query { wo: answer.wo(), ..*query }).collect();
@@ -146,7 +150,9 @@ fn rough_surfaces_draw_what_their_densities_say() {
             }
         }
         let (albedo, error) = mean_and_error(&energy);
-        assert!(albedo > 0.5 && albedo <= 1.0 + 4.0 * error, "{name}: it reflects and transmits {albedo} ± {error}");
+        // What facets shadow is lost, and under a rough varnish twice.
+        let least = if name.starts_with("rough plastic") { 0.35 } else { 0.5 };
+        assert!(albedo > least && albedo <= 1.0 + 4.0 * error, "{name}: it reflects and transmits {albedo} ± {error}");
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
@@ -264,6 +270,7 @@ fn pack_with(scene: &Scene, seed: u32, replaced: &[(&str, Surface)]) -> Packed {
             primitive.surface &= !PRIMITIVE_BOUNDARY;
         }
     }
+    packed.values = values();
     packed.features = Features::of(scene, &packed);
     packed
 }
@@ -292,7 +299,7 @@ fn device_and_reference_follow_the_same_paths() {
         ("mirror", false, metal(0.0, false)),
         ("rough metal", false, metal(0.15, false)),
         ("smooth plastic", false, plastic(0.0, false)),
-        ("rough plastic", false, plastic(0.2, true)),
+        ("rough plastic", false, rough_plastic(0.2, true)),
     ];
     for (name, medium, surface) in cases {
         let packed = pack_with(&box_with(medium), 17, &[("ball", surface)]);
@@ -307,6 +314,7 @@ fn device_and_reference_follow_the_same_paths() {
                 Surface {
                     eta: surface.eta * 1.05,
                     alpha: surface.alpha * 1.05,
+                    alpha_v: surface.alpha_v * 1.05,
                     specular: surface.specular * 0.9,
                     ..surface
                 },

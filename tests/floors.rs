@@ -87,11 +87,12 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("sky", &["math"]),
     ("medium", &["math"]),
     ("path_state", &["math", "sampler", "medium", "light"]),
+    ("path_surface", &["path_state", "texture"]),
     ("equiangular", &["math"]),
-    ("path_vertex", &["path_state", "warp", "ray", "phase", "bsdf"]),
+    ("path_vertex", &["path_state", "path_surface", "warp", "ray", "phase", "bsdf"]),
     ("path_lights", &["path_state", "path_vertex", "light", "sky"]),
     ("path_flight", &["path_state", "equiangular", "ray", "light"]),
-    ("path_rays", &["path_state", "path_flight", "ray"]),
+    ("path_rays", &["path_state", "path_surface", "path_flight", "ray"]),
     ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "path_flight", "camera"]),
 ];
 const ALL_MAY_INCLUDE: &[&str] = &["constants", "layout", "features", "sobol"];
@@ -153,7 +154,16 @@ fn every_concept_has_a_mirror_and_a_unit_kernel() {
         names("shaders/units", ".comp"),
         without(
             concepts,
-            &["path", "path_flight", "path_lights", "path_rays", "path_state", "path_vertex", "bindings"]
+            &[
+                "path",
+                "path_flight",
+                "path_lights",
+                "path_rays",
+                "path_state",
+                "path_surface",
+                "path_vertex",
+                "bindings"
+            ]
         ),
         "unit kernels of concepts"
     );

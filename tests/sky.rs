@@ -32,8 +32,12 @@ impl Map {
         Map { bitmap, texture: packed.texture, values, mean: packed.mean }
     }
 
+    fn widened(&self) -> reference::bindings::Texture {
+        (&self.texture).into()
+    }
+
     fn grid(&self) -> [u32; 2] {
-        [reference::sky::sky_columns(&self.texture), reference::sky::sky_rows(&self.texture)]
+        [reference::sky::sky_columns(&self.widened()), reference::sky::sky_rows(&self.widened())]
     }
 
     /// Runs the unit kernel on numbers to sample by and directions to look up.
@@ -121,7 +125,7 @@ fn device_and_reference_agree() {
         for ((u, d), answer) in numbers.iter().zip(&directions).zip(&answers) {
             let case = format!("{u:?}, {d}");
             let (place, decision) = (DVec2::new(u[0], u[1]), DVec2::new(u[2], u[3]));
-            let found = reference::sky::sample_sky(&map.values, &map.texture, place, decision);
+            let found = reference::sky::sample_sky(&map.values, &map.widened(), place, decision);
             direction.vector(&case, &answer.0[0][..3], found.direction);
             radiance.vector(&case, &answer.0[1][..3], found.radiance);
             pdf.scalar(&case, answer.0[0][3], found.pdf);
@@ -130,11 +134,11 @@ fn device_and_reference_agree() {
             if (uv.x - uv.x.round()).abs() > 1e-6 {
                 coordinates.vector(&case, &answer.0[3][..2], uv.extend(0.0));
             }
-            radiance.vector(&case, &answer.0[2][..3], reference::sky::sky_radiance(&map.values, &map.texture, uv));
+            radiance.vector(&case, &answer.0[2][..3], reference::sky::sky_radiance(&map.values, &map.widened(), uv));
             // On the border of two cells, either is right.
             let cell = DVec2::new(uv.x, 0.5 - 0.5 * d.y) * DVec2::from(map.grid().map(f64::from));
             if (cell - cell.round()).abs().min_element() > 1e-3 {
-                let expected = reference::sky::sky_pdf(&map.values, &map.texture, uv.x, d.y);
+                let expected = reference::sky::sky_pdf(&map.values, &map.widened(), uv.x, d.y);
                 pdf.scalar(&case, answer.0[2][3], expected);
             }
         }
@@ -181,7 +185,7 @@ fn density_integral(map: &Map) -> f64 {
         .map(|(row, column)| {
             let (u, y) =
                 ((f64::from(column) + 0.5) / f64::from(columns), 1.0 - (2.0 * f64::from(row) + 1.0) / f64::from(rows));
-            reference::sky::sky_pdf(&map.values, &map.texture, u, y)
+            reference::sky::sky_pdf(&map.values, &map.widened(), u, y)
         })
         .sum();
     sum * 4.0 * PI / f64::from(columns * rows)
@@ -234,7 +238,7 @@ fn check_drawn(map: &Map, answers: &[Answer], pdf: impl Fn(f64, f64) -> f64) -> 
 fn the_sky_is_drawn_as_its_density_says() {
     for (seed, (name, map)) in (63..).zip(maps()) {
         let answers = map.draw(200_000, &mut Random(seed));
-        let pdf = |u: f64, y: f64| reference::sky::sky_pdf(&map.values, &map.texture, u, y);
+        let pdf = |u: f64, y: f64| reference::sky::sky_pdf(&map.values, &map.widened(), u, y);
         check_drawn(&map, &answers, pdf).unwrap_or_else(|why| panic!("{name}: {why}"));
         if name == "sunny" {
             check_drawn(&map, &answers, |u, y| pdf(1.0 - u, y)).expect_err("u the wrong way round");
@@ -331,7 +335,7 @@ fn a_sun_of_one_pixel_in_a_large_map_is_not_lost_between_cells() {
         assert_eq!(map.grid(), [2048, 1024]);
         let place = (place.0 as f64 + 0.5, place.1 as f64);
         let (u, theta) = (place.0 / 4096.0, place.1 / 2047.0 * PI);
-        let pdf = reference::sky::sky_pdf(&map.values, &map.texture, u, theta.cos());
+        let pdf = reference::sky::sky_pdf(&map.values, &map.widened(), u, theta.cos());
         // The hat of a pixel covers at most two cells in each direction, near the poles more in azimuth.
         assert!(pdf * 4.0 * PI / (2048.0 * 1024.0) > 0.03, "{place:?}: {pdf}");
     }

@@ -5,15 +5,15 @@ mod common;
 use common::comparison::Comparison;
 use common::random::Random;
 use common::scenes::v;
-use common::surfaces::{Query, ask, glass, metal, plastic, single};
+use common::surfaces::{Query, ask, brushed, glass, metal, plastic, rough_plastic, single, values};
 use common::tolerances::comparison;
 use common::units::widen;
 use glam::{DVec2, DVec3};
 use tyndall::pack::layout::{SURFACE_GGX, SURFACE_NONLINEAR, SURFACE_THIN, Surface};
 use tyndall::reference::bindings;
 use tyndall::reference::bsdf::{
-    BsdfValue, eval_bsdf, facet_density, facet_masking, fresnel_conductor, fresnel_dielectric, sample_bsdf,
-    sample_facet,
+    BsdfValue, eval_bsdf, facet_density, facet_masking, facet_pdf, fresnel_conductor, fresnel_dielectric, roughness,
+    sample_bsdf, sample_facet,
 };
 
 /// The largest of the program's random numbers.
@@ -30,6 +30,12 @@ fn surfaces() -> Vec<Surface> {
     }
     all.push(Surface { flags: glass(0.0, false).flags | SURFACE_THIN, ..glass(0.0, false) });
     all.push(Surface { flags: plastic(0.2, true).flags | SURFACE_NONLINEAR, ..plastic(0.2, true) });
+    for ggx in [false, true] {
+        all.extend([rough_plastic(0.1, ggx), rough_plastic(0.5, ggx)]);
+        for (alpha, alpha_v) in [(0.05, 0.4), (0.6, 0.1)] {
+            all.extend([brushed(glass(alpha, ggx), alpha_v), brushed(metal(alpha, ggx), alpha_v)]);
+        }
+    }
     all
 }
 
@@ -154,11 +160,12 @@ fn facets_and_fresnel() {
         "sample_facet",
         "facet_density",
         "facet_masking",
+        "facet_pdf",
     ];
     let mut functions = Functions::new(&names);
     for (query, answer) in queries.iter().zip(ask(&surfaces, &queries)) {
         let surface = bindings::Surface::from(&surfaces[query.surface]);
-        let (ggx, alpha) = (surface.flags & SURFACE_GGX != 0, surface.alpha);
+        let (ggx, alpha) = (surface.flags & SURFACE_GGX != 0, roughness(&surface));
         let case = format!("{query:?}");
         if surface.eta > 0.0 {
             let (f, cos_t) = fresnel_dielectric(query.wi.z, surface.eta);
@@ -173,12 +180,26 @@ fn facets_and_fresnel() {
             let expected = fresnel_conductor(query.wi.z.abs(), surface.transmittance, surface.extinction);
             functions.of("fresnel_conductor").vector(&case, &answer.conductor, expected);
         }
-        if alpha > 0.0 {
-            let expected = sample_facet(DVec2::from_array(query.u), alpha, ggx);
-            functions.of("sample_facet").vector(&case, &answer.facet, expected);
+        if alpha.x > 0.0 {
+            let u = DVec2::from_array(query.u);
+            let expected = sample_facet(query.wi, u, alpha, ggx);
+            // Half way between two nearly opposite directions, the rounding of either counts.
+            let moved: Vec<DVec3> = nudged(query.wi)
+                .map(|wi| sample_facet(wi, u, alpha, ggx))
+                .chain([-2.4e-7, 2.4e-7].map(|step| sample_facet(query.wi, DVec2::new(u.x, u.y + step), alpha, ggx)))
+                .chain(
+                    [-1.2e-7, 1.2e-7].map(|step| {
+                        sample_facet(query.wi, DVec2::new((u.x * (1.0 + step)).min(LAST), u.y), alpha, ggx)
+                    }),
+                )
+                .collect();
+            functions.near_vector("sample_facet", &case, answer.facet, expected, &moved);
             // Of the facet that the kernel found: rounding it is not an error of the function.
             let m = widen(&answer.facet);
             functions.of("facet_density").scalar(&case, answer.density, facet_density(m, alpha, ggx));
+            let moved: Vec<f64> = nudged(query.wi).map(|wi| facet_pdf(wi, m, alpha, ggx)).collect();
+            let want = facet_pdf(query.wi, m, alpha, ggx);
+            functions.near("facet_pdf", &case, answer.facet_pdf, want, &moved);
             for (w, found) in [query.wi, query.wo].into_iter().zip(answer.masking) {
                 let moved: Vec<f64> = nudged(w).map(|w| facet_masking(w, m, alpha, ggx)).collect();
                 functions.near("facet_masking", &case, found, facet_masking(w, m, alpha, ggx), &moved);
@@ -190,7 +211,7 @@ fn facets_and_fresnel() {
 
 #[test]
 fn surfaces_scatter_as_the_reference() {
-    let surfaces = surfaces();
+    let (surfaces, table) = (surfaces(), values());
     let queries = queries(&surfaces);
     let names = ["eval_bsdf value", "eval_bsdf pdf", "sample_bsdf direction", "sample_bsdf pdf", "sample_bsdf weight"];
     let mut functions = Functions::new(&names);
@@ -203,30 +224,38 @@ fn surfaces_scatter_as_the_reference() {
         // Both directions moved by the rounding of single precision.
         let around = |wo: DVec3| {
             let pairs = nudged(wi).map(|wi| (wi, wo)).chain(nudged(wo).map(|wo| (wi, wo)));
-            let value = eval_bsdf(&surface, wi, wo);
+            let value = eval_bsdf(&surface, &table, wi, wo);
             let factor = 1.0 + refracted(&surface, wi, wo);
             let dimmed = BsdfValue { value: value.value * factor, pdf: value.pdf * factor };
             // Value and density may lose of it separately.
             let apart = BsdfValue { value: value.value * factor, pdf: value.pdf / factor };
-            pairs.map(|(wi, wo)| eval_bsdf(&surface, wi, wo)).chain([dimmed, apart]).collect::<Vec<_>>()
+            pairs.map(|(wi, wo)| eval_bsdf(&surface, &table, wi, wo)).chain([dimmed, apart]).collect::<Vec<_>>()
         };
-        let (asked, moved) = (eval_bsdf(&surface, wi, wo), around(wo));
+        let (asked, moved) = (eval_bsdf(&surface, &table, wi, wo), around(wo));
         let values: Vec<DVec3> = moved.iter().map(|moved| moved.value).collect();
         let pdfs: Vec<f64> = moved.iter().map(|moved| moved.pdf).collect();
         functions.near_vector("eval_bsdf value", &case, answer.value, asked.value, &values);
         functions.near("eval_bsdf pdf", &case, answer.value_pdf, asked.pdf, &pdfs);
 
-        let found = sample_bsdf(&surface, wi, u, lobe);
+        let found = sample_bsdf(&surface, &table, wi, u, lobe);
         let turned = [-2.4e-7, 2.4e-7].map(|step| DVec2::new(u.x, u.y + step));
         let moved: Vec<_> = nudged(wi)
-            .map(|wi| sample_bsdf(&surface, wi, u, lobe))
-            .chain(turned.map(|u| sample_bsdf(&surface, wi, u, lobe)))
+            .map(|wi| sample_bsdf(&surface, &table, wi, u, lobe))
+            .chain(turned.map(|u| sample_bsdf(&surface, &table, wi, u, lobe)))
+            .chain([-1.2e-7, 1.2e-7].map(|step| {
+                let u = DVec2::new((u.x * (1.0 + step)).min(LAST), u.y);
+                sample_bsdf(&surface, &table, wi, u, lobe)
+            }))
             .chain([-4e-6, 4e-6].map(|step| {
                 // The tangent of the facet, whose error sample_facet declares.
-                let other = bindings::Surface { alpha: surface.alpha * (1.0 + step), ..surface };
-                sample_bsdf(&other, wi, u, lobe)
+                let other = bindings::Surface {
+                    alpha: surface.alpha * (1.0 + step),
+                    alpha_v: surface.alpha_v * (1.0 + step),
+                    ..surface
+                };
+                sample_bsdf(&other, &table, wi, u, lobe)
             }))
-            .chain([-1e-6, 1e-6].map(|step| sample_bsdf(&surface, wi, u, lobe + step)))
+            .chain([-1e-6, 1e-6].map(|step| sample_bsdf(&surface, &table, wi, u, lobe + step)))
             .collect();
         // At the border of two lobes, or of failure, either is right.
         let vanishes = found.pdf > 0.0 && around(found.direction).iter().any(|moved| moved.pdf <= 0.0);
@@ -243,7 +272,7 @@ fn surfaces_scatter_as_the_reference() {
         assert_eq!(answer.pdf > 0.0, found.pdf > 0.0, "{case}: {answer:?}, expected {found:?}");
         if found.pdf > 0.0 {
             // Of the direction that the kernel found.
-            let (expected, moved) = (eval_bsdf(&surface, wi, answer.wo()), around(answer.wo()));
+            let (expected, moved) = (eval_bsdf(&surface, &table, wi, answer.wo()), around(answer.wo()));
             let weights: Vec<DVec3> =
                 moved.iter().filter(|moved| moved.pdf > 0.0).map(|moved| moved.value / moved.pdf).collect();
             let pdfs: Vec<f64> = moved.iter().map(|moved| moved.pdf).collect();

@@ -1,6 +1,7 @@
 // What surfaces do to light. Directions are in the local frame of the surface, z along its normal (for a surface with two
 // different sides, towards the outside), and point away from the surface: wi to where the path comes from, wo to where it goes
-// on. Values include the cosine of wo. Densities are per solid angle; a direction without a density (a mirror's) has pdf 0.
+// on; x is the tangent, along which the roughness is alpha, and y the bitangent. Values include the cosine of wo. Densities are per
+// solid angle; a direction without a density (a mirror's) has pdf 0. Tables are read by VALUE(i), which the kernel declares.
 #include "lib/constants.glsl"
 #include "lib/math.glsl"
 #include "lib/warp.glsl"
@@ -50,48 +51,72 @@ vec3 fresnel_conductor(float cos_i, vec3 eta, vec3 k) {
     return 0.5 * (s + p);
 }
 
-// Density of microfacet normals, [1/sr], for normals with z > 0. Beckmann (1963) or GGX (Walter et al. 2007).
-float facet_density(vec3 m, float alpha, bool ggx) {
+// Density of microfacet normals, [1/sr], for normals with z > 0. Beckmann (1963) or GGX (Walter et al. 2007), in their
+// anisotropic forms (Heitz 2014, equations 79 and 85).
+float facet_density(vec3 m, vec2 alpha, bool ggx) {
     if (m.z <= 0.0) {
         return 0.0;
     }
-    float c2 = m.z * m.z, s2 = m.x * m.x + m.y * m.y;
-    float a2 = alpha * alpha;
+    vec2 stretched = m.xy / alpha;
+    float c2 = m.z * m.z, s2 = dot(stretched, stretched);
     if (ggx) {
-        float d = a2 * c2 + s2;
-        return a2 / (PI * d * d);
+        float d = c2 + s2;
+        return 1.0 / (PI * alpha.x * alpha.y * d * d);
     }
     // Where c2 is too small for single precision, the exponential is 0.
-    float shape = exp_minus(s2 / (a2 * c2));
-    return shape > 0.0 ? shape / (PI * a2 * c2 * c2) : 0.0;
+    float shape = exp_minus(s2 / c2);
+    return shape > 0.0 ? shape / (PI * alpha.x * alpha.y * c2 * c2) : 0.0;
 }
 
 // Smith's masking of direction v for facets with normal m.
-float facet_masking(vec3 v, vec3 m, float alpha, bool ggx) {
+float facet_masking(vec3 v, vec3 m, vec2 alpha, bool ggx) {
     if (dot(v, m) * v.z <= 0.0) {
         return 0.0;
     }
-    float tan2 = (v.x * v.x + v.y * v.y) / (v.z * v.z);
+    vec2 stretched = v.xy * alpha;
+    float tan2 = dot(stretched, stretched) / (v.z * v.z);
     if (tan2 == 0.0) {
         return 1.0;
     }
     if (ggx) {
-        return 2.0 / (1.0 + sqrt(1.0 + alpha * alpha * tan2));
+        return 2.0 / (1.0 + sqrt(1.0 + tan2));
     }
     // Walter et al.'s (2007) rational approximation, relative error below 0.35 %.
-    float a = 1.0 / (alpha * sqrt(tan2));
+    float a = 1.0 / sqrt(tan2);
     return a >= 1.6 ? 1.0 : (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a);
 }
 
-// A facet normal with density facet_density * m.z.
-vec3 sample_facet(vec2 u, float alpha, bool ggx) {
-    float tan2 = ggx ? alpha * alpha * u.x / (1.0 - u.x) : alpha * alpha * minus_log_1m(u.x);
-    float c = inversesqrt(1.0 + tan2);
-    return from_polar(c, sqrt(tan2) * c, u.y);
+// A facet normal with density facet_pdf. Of GGX the facets that w sees are sampled, on the sphere to which the roughness stretches
+// them (Dupuy and Benyoub 2023); of Beckmann all facets, in proportion to their projected area.
+vec3 sample_facet(vec3 w, vec2 u, vec2 alpha, bool ggx) {
+    if (!ggx) {
+        float phi = 2.0 * PI * u.y;
+        vec2 slope = sqrt(minus_log_1m(u.x)) * alpha * vec2(cos(phi), sin(phi));
+        float c = inversesqrt(1.0 + dot(slope, slope));
+        return vec3(slope * c, c);
+    }
+    vec3 v = normalize(vec3(alpha * w.xy, w.z));
+    v = w.z < 0.0 ? -v : v;
+    // A point of the cap z > -v.z of the unit sphere, uniformly; 1 - z is `down` and 1 + z is `up`, neither with cancellation. The
+    // normal is half way to v.
+    float height = 1.0 + v.z;
+    float down = u.x * height, up = (1.0 - u.x) * height + dot(v.xy, v.xy) / height;
+    vec3 cap = from_polar(1.0 - down, sqrt(down * up), u.y);
+    return normalize(vec3(alpha * (cap.xy + v.xy), height * (1.0 - u.x)));
+}
+
+// Density of sample_facet, [1/sr]: of the facets that w sees D G1(w) |w.m| / |w.z| (Heitz 2014, equation 15), else D m.z.
+float facet_pdf(vec3 w, vec3 m, vec2 alpha, bool ggx) {
+    float density = facet_density(m, alpha, ggx);
+    return ggx ? density * facet_masking(w, m, alpha, ggx) * abs(dot(w, m) / w.z) : density * m.z;
 }
 
 uint bsdf_kind(Surface surface) {
     return surface.flags >> SURFACE_KIND_SHIFT;
+}
+
+vec2 roughness(Surface surface) {
+    return vec2(surface.alpha, HAS_ANISOTROPIC ? surface.alpha_v : surface.alpha);
 }
 
 bool is_ggx(Surface surface) {
@@ -109,19 +134,30 @@ vec3 refract_at(vec3 w, vec3 m, float cos_t, float eta) {
     return m * (c * scale + cos_t) - w * scale;
 }
 
+// Fraction of light from outside that the varnish of plastic lets through: of a rough one, from a table over the cosine.
+float coat_transmittance(Surface surface, float cosine) {
+    if (HAS_ROUGH_PLASTIC && surface.value_count != 0u) {
+        float place = cosine * float(surface.value_count - 1u);
+        uint entry = min(uint(place), surface.value_count - 2u);
+        return mix(VALUE(surface.first_value + entry), VALUE(surface.first_value + entry + 1u), place - float(entry));
+    }
+    float unused;
+    return 1.0 - fresnel_dielectric(cosine, surface.eta, unused);
+}
+
 // The diffuse lobe of plastic: light refracted in, scattered, and refracted out again (Mitsuba's model, after Jakob 2010;
-// internal reflection adds up to a geometric series).
-vec3 plastic_diffuse(Surface surface, float fresnel_i, float fresnel_o) {
+// internal reflection adds up to a geometric series). The varnish lets the fractions through_i and through_o through.
+vec3 plastic_diffuse(Surface surface, float through_i, float through_o) {
     vec3 body = surface.reflectance;
     bool nonlinear = (surface.flags & SURFACE_NONLINEAR) != 0u;
     body /= 1.0 - (nonlinear ? body * surface.internal_reflectance : vec3(surface.internal_reflectance));
-    return body * ((1.0 - fresnel_i) * (1.0 - fresnel_o) / (surface.eta * surface.eta));
+    return body * (through_i * through_o / (surface.eta * surface.eta));
 }
 
 // Probability of plastic's specular lobe.
-float plastic_specular_probability(Surface surface, float fresnel_i) {
-    float specular = fresnel_i * surface.specular_weight;
-    return specular / max(specular + (1.0 - fresnel_i) * (1.0 - surface.specular_weight), 1e-30);
+float plastic_specular_probability(Surface surface, float through_i) {
+    float specular = (1.0 - through_i) * surface.specular_weight;
+    return specular / max(specular + through_i * (1.0 - surface.specular_weight), 1e-30);
 }
 
 BsdfValue eval_bsdf(Surface surface, vec3 wi, vec3 wo) {
@@ -136,32 +172,35 @@ BsdfValue eval_bsdf(Surface surface, vec3 wi, vec3 wo) {
         if (wi.z <= 0.0 || wo.z <= 0.0) {
             return none;
         }
-        float fresnel_i = fresnel_dielectric(wi.z, surface.eta, unused), fresnel_o = fresnel_dielectric(wo.z, surface.eta, unused);
-        float diffuse_probability = 1.0 - plastic_specular_probability(surface, fresnel_i);
-        vec3 value = plastic_diffuse(surface, fresnel_i, fresnel_o) * (wo.z * INV_PI);
+        float through_i = coat_transmittance(surface, wi.z), through_o = coat_transmittance(surface, wo.z);
+        float diffuse_probability = 1.0 - plastic_specular_probability(surface, through_i);
+        vec3 value = plastic_diffuse(surface, through_i, through_o) * (wo.z * INV_PI);
         float pdf = diffuse_probability * wo.z * INV_PI;
         if (surface.alpha > 0.0) {
             vec3 m = normalize(wi + wo);
-            float density = facet_density(m, surface.alpha, is_ggx(surface));
-            float masking = facet_masking(wi, m, surface.alpha, is_ggx(surface)) * facet_masking(wo, m, surface.alpha, is_ggx(surface));
+            vec2 alpha = roughness(surface);
+            float density = facet_density(m, alpha, is_ggx(surface));
+            float masking = facet_masking(wi, m, alpha, is_ggx(surface)) * facet_masking(wo, m, alpha, is_ggx(surface));
             float f = fresnel_dielectric(dot(wi, m), surface.eta, unused);
             value += surface.specular * (f * density * masking / (4.0 * wi.z));
-            pdf += (1.0 - diffuse_probability) * density * m.z / (4.0 * dot(wi, m));
+            pdf += (1.0 - diffuse_probability) * facet_pdf(wi, m, alpha, is_ggx(surface)) / (4.0 * dot(wi, m));
         }
         return BsdfValue(value, pdf);
     }
     if (surface.alpha == 0.0) {
         return none;
     }
+    vec2 alpha = roughness(surface);
+    bool ggx = is_ggx(surface);
     if (HAS_CONDUCTOR && kind == BSDF_CONDUCTOR) {
         if (wi.z <= 0.0 || wo.z <= 0.0) {
             return none;
         }
         vec3 m = normalize(wi + wo);
-        float density = facet_density(m, surface.alpha, is_ggx(surface));
-        float masking = facet_masking(wi, m, surface.alpha, is_ggx(surface)) * facet_masking(wo, m, surface.alpha, is_ggx(surface));
+        float density = facet_density(m, alpha, ggx);
+        float masking = facet_masking(wi, m, alpha, ggx) * facet_masking(wo, m, alpha, ggx);
         vec3 f = fresnel_conductor(dot(wi, m), surface.transmittance, surface.extinction);
-        return BsdfValue(surface.specular * f * (density * masking / (4.0 * wi.z)), density * m.z / (4.0 * dot(wi, m)));
+        return BsdfValue(surface.specular * f * (density * masking / (4.0 * wi.z)), facet_pdf(wi, m, alpha, ggx) / (4.0 * dot(wi, m)));
     }
     if (HAS_DIELECTRIC && kind == BSDF_DIELECTRIC) {
         if (wi.z == 0.0 || wo.z == 0.0) {
@@ -176,16 +215,16 @@ BsdfValue eval_bsdf(Surface surface, vec3 wi, vec3 wo) {
         if (ci * wi.z <= 0.0 || co * wo.z <= 0.0) {
             return none;
         }
-        float density = facet_density(m, surface.alpha, is_ggx(surface));
-        float masking = facet_masking(wi, m, surface.alpha, is_ggx(surface)) * facet_masking(wo, m, surface.alpha, is_ggx(surface));
+        float density = facet_density(m, alpha, ggx), facets = facet_pdf(wi, m, alpha, ggx);
+        float masking = facet_masking(wi, m, alpha, ggx) * facet_masking(wo, m, alpha, ggx);
         float f = fresnel_dielectric(ci, surface.eta, unused);
         if (reflects) {
-            return BsdfValue(surface.specular * (f * density * masking / (4.0 * abs(wi.z))), f * density * m.z / (4.0 * abs(ci)));
+            return BsdfValue(surface.specular * (f * density * masking / (4.0 * abs(wi.z))), f * facets / (4.0 * abs(ci)));
         }
         // The Jacobian eta^2 |co| / (ci + eta co)^2; radiance divides it by eta^2.
         float jacobian = abs(co) / ((ci + eta * co) * (ci + eta * co));
         vec3 value = surface.transmittance * ((1.0 - f) * density * masking * jacobian * abs(ci / wi.z));
-        return BsdfValue(value, (1.0 - f) * density * m.z * jacobian * eta * eta);
+        return BsdfValue(value, (1.0 - f) * facets * jacobian * eta * eta);
     }
     return none;
 }
@@ -210,7 +249,6 @@ BsdfSample sample_smooth_dielectric(Surface surface, vec3 wi, float lobe) {
 BsdfSample sample_bsdf(Surface surface, vec3 wi, vec2 u, float lobe) {
     BsdfSample none = BsdfSample(vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0, 1.0);
     uint kind = bsdf_kind(surface);
-    float unused;
     BsdfSample found = none;
     if (kind == BSDF_DIFFUSE) {
         found.direction = square_to_cosine_hemisphere(u);
@@ -228,18 +266,18 @@ BsdfSample sample_bsdf(Surface surface, vec3 wi, vec2 u, float lobe) {
         return BsdfSample(reflect_z(wi), surface.specular * fresnel_conductor(wi.z, surface.transmittance, surface.extinction), 0.0, 1.0);
     }
     if (HAS_PLASTIC && kind == BSDF_PLASTIC) {
-        float f = fresnel_dielectric(wi.z, surface.eta, unused);
-        float p = plastic_specular_probability(surface, f);
+        float through = coat_transmittance(surface, wi.z);
+        float p = plastic_specular_probability(surface, through);
         if (lobe >= p) {
             found.direction = square_to_cosine_hemisphere(u);
         } else if (surface.alpha == 0.0) {
-            return BsdfSample(reflect_z(wi), surface.specular * (f / p), 0.0, 1.0);
+            return BsdfSample(reflect_z(wi), surface.specular * ((1.0 - through) / p), 0.0, 1.0);
         } else {
-            vec3 m = sample_facet(u, surface.alpha, is_ggx(surface));
+            vec3 m = sample_facet(wi, u, roughness(surface), is_ggx(surface));
             found.direction = 2.0 * dot(wi, m) * m - wi;
         }
     } else {
-        vec3 m = sample_facet(u, surface.alpha, is_ggx(surface));
+        vec3 m = sample_facet(wi, u, roughness(surface), is_ggx(surface));
         found.direction = 2.0 * dot(wi, m) * m - wi;
         if (HAS_DIELECTRIC && kind == BSDF_DIELECTRIC) {
             // A facet that is seen from behind is none; eval_bsdf knows nothing of what it would send elsewhere.

@@ -21,6 +21,9 @@
 // Depth at which roulette begins to end paths that lose nothing, so that a closed scene without absorption ends.
 const uint RELENTLESS_DEPTH = 256u;
 
+// The sets of random numbers by which light meets masks or passes them begin here, beyond those of any segment.
+const uint MASK_SETS = 0x80000000u;
+
 void path_start(inout Path path) {
     vec4 u = sample_set(path, 0u);
     uint row = path.pixel / params.film_width, column = path.pixel - row * params.film_width;
@@ -38,6 +41,7 @@ void path_start(inout Path path) {
     path.pdf = 0.0;
     path.alive = true;
     path.eta_scale = 1.0;
+    path.crossings = 0u;
     path.medium = params.camera_medium;
     begin_segment(path, u.zw);
 }
@@ -88,6 +92,30 @@ void next_segment(inout Path path) {
     begin_segment(path, u.zw);
 }
 
+// Goes straight on through a surface.
+void cross_surface(inout Path path, Primitive primitive, Surface surface, Hit hit) {
+    uint inside = surface.media & 0xffffu, outside = surface.media >> 16u;
+    bool again = path.last != NONE && hit.t - path.t_min < near_distance(path, hit.t);
+    enter_medium(path, hit.along_normal ? inside : outside, hit.along_normal ? outside : inside, again);
+    path.t_min = hit.t;
+    path.last = hit.primitive;
+    path.last_along_normal = hit.along_normal;
+    vec3 normal;
+    float largest;
+    surface_point(primitive, path, hit, path.anchor, normal, largest);
+    path.tau_left = max(path.tau_left, 0.0);
+    path.t_max = flight_end(path);
+}
+
+// Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
+bool passes_mask(inout Path path, Surface surface, Primitive primitive, Hit hit) {
+    float opacity = opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric);
+    float u = sample_set(path, MASK_SETS + path.crossings).x;
+    path.crossings += 1u;
+    path.passed *= 1.0 - opacity;
+    return u >= opacity;
+}
+
 // Answers a ray that extends the path.
 void path_advance(inout Path path, Hit hit) {
     bool surface_hit = hit.primitive != NONE && hit.t < path.t_max;
@@ -106,7 +134,8 @@ void path_advance(inout Path path, Hit hit) {
         path.offset = 0.0;
         path.normal = path.direction;
         Surface none;
-        scatter(path, Vertex(flight_point(path, hit, end.way), path.direction, true, medium.g, medium.phase, end.weight, none, vec3(0.0)));
+        vec3 point = flight_point(path, hit, end.way);
+        scatter(path, Vertex(point, path.direction, true, medium.g, medium.phase, end.weight, none, vec3(0.0), vec3(0.0), vec3(0.0)));
     } else {
         if (HAS_MEDIA) {
             // The optical depth of the way through the medium since t_min.
@@ -127,23 +156,17 @@ void path_advance(inout Path path, Hit hit) {
         Primitive primitive = PRIMITIVE(hit.primitive);
         Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
         if (HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u) {
-            uint inside = surface.media & 0xffffu, outside = surface.media >> 16u;
-            bool again = path.last != NONE && t - path.t_min < near_distance(path, t);
-            enter_medium(path, hit.along_normal ? inside : outside, hit.along_normal ? outside : inside, again);
-            path.t_min = t;
-            path.last = hit.primitive;
-            path.last_along_normal = hit.along_normal;
-            vec3 normal;
-            float largest;
-            surface_point(primitive, path, hit, path.anchor, normal, largest);
-            path.tau_left = max(path.tau_left, 0.0);
-            path.t_max = flight_end(path);
+            cross_surface(path, primitive, surface, hit);
             return;
         }
         vec3 point, normal;
         float largest;
         surface_point(primitive, path, hit, point, normal, largest);
         add_emission(path, primitive, t, normal);
+        if (HAS_MASK && (surface.flags & SURFACE_MASK) != 0u && passes_mask(path, surface, primitive, hit)) {
+            cross_surface(path, primitive, surface, hit);
+            return;
+        }
         path.throughput = survived_throughput(path);
         bool back = dot(path.direction, normal) > 0.0;
         if (HAS_ONE_SIDED && back && (surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED)) == 0u) {
@@ -151,10 +174,34 @@ void path_advance(inout Path path, Hit hit) {
             path.shadow = false;
             return;
         }
-        vec3 axis = back && !(HAS_DIELECTRIC && (surface.flags & SURFACE_ORIENTED) != 0u) ? -normal : normal;
+        bool turned = back && !(HAS_DIELECTRIC && (surface.flags & SURFACE_ORIENTED) != 0u);
+        vec3 axis = normal;
+        if (HAS_SHADING_NORMALS && (surface.flags & SURFACE_SMOOTH) != 0u) {
+            axis = shading_normal(hit.primitive, hit.barycentric, normal);
+        }
+        axis = turned ? -axis : axis;
+        normal = turned ? -normal : normal;
+        vec3 tangent, bitangent;
+        if (HAS_ANISOTROPIC) {
+            orthonormal_frame(axis, tangent, bitangent);
+            if (surface.alpha != surface.alpha_v) {
+                tangent = surface_tangent(primitive, hit.primitive, point, axis);
+            }
+        }
+        if (HAS_TEXTURES && (surface.textures_1 | (surface.textures_2 & 0xffffu)) != 0u) {
+            apply_textures(surface, texture_coordinates(primitive, hit.primitive, point, hit.barycentric));
+        }
         path.offset = offset_distance(largest);
-        path.normal = axis;
-        scatter(path, Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, to_frame(axis, -path.direction)));
+        path.normal = normal;
+        vec3 incident = to_surface_frame(tangent, axis, -path.direction);
+        Vertex vertex = Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, incident, tangent, normal);
+        if (!sides_agree(vertex, incident.z, -path.direction)) {
+            // The surface is seen from one side, its shading normal from the other one: nothing is reflected.
+            path.alive = false;
+            path.shadow = false;
+            return;
+        }
+        scatter(path, vertex);
     }
     if (!path.shadow && path.alive) {
         next_segment(path);
@@ -174,6 +221,10 @@ void path_light(inout Path path, Hit hit) {
                 survives = exp_minus(max(hit.tau, 0.0));
                 transmittance = vec3(survives);
             }
+        }
+        if (HAS_MASK) {
+            transmittance *= hit.passed;
+            survives *= hit.passed;
         }
         if (HAS_VOLUME_LIGHTS && LIGHT(path.light).kind == LIGHT_VOLUME) {
             // The point lies in the sphere about the medium, but perhaps not in the medium itself.

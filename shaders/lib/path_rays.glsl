@@ -1,6 +1,7 @@
 // What a path's rays take from the primitives they meet: the nearest one, or, for shadow rays, everything in any order.
 #include "lib/path_state.glsl"
 #include "lib/path_flight.glsl"
+#include "lib/path_surface.glsl"
 #include "lib/ray.glsl"
 
 // The length L of a shadow ray in its optical depth sigma_0 L + sum (sigma_to - sigma_from) (L - t_i), in which the order of the
@@ -36,13 +37,25 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
     if (HAS_LIGHT_SAMPLING && path.shadow) {
         bool boundary = HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u;
         bool counts = begins && t < path.t_max;
-        if (HAS_BOUNDARIES && HAS_MEDIA) {
+        // The light itself is not in the way of its light.
+        bool opaque = counts && !boundary && primitive.light != path.light + 1u;
+        if (HAS_MASK && opaque) {
+            Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
+            if ((surface.flags & SURFACE_MASK) != 0u) {
+                float opacity = opacity_at(surface, primitive, index, path.origin + path.direction * t, barycentric);
+                hit.passed *= 1.0 - opacity;
+                opaque = opacity >= 1.0;
+                boundary = true;
+            }
+        }
+        if ((HAS_BOUNDARIES || HAS_MASK) && HAS_MEDIA) {
             float way = (shadow_length(path) - t) * (along_normal ? -1.0 : 1.0);
             hit.tau += counts && boundary ? primitive.sigma_t_step * way : 0.0;
             if (HAS_CHROMATIC && counts && boundary) {
                 hit.tau_rgb += SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE)).sigma_t_step * way;
             }
         }
+        hit.blocked = hit.blocked || opaque;
         if (HAS_VOLUME_LIGHTS && counts && boundary) {
             // In any order: the differences of indices add up.
             uint media = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE)).media;

@@ -36,6 +36,8 @@ struct Path {
     float tau;              // optical depth from the last event to t_min
     vec3 tau_rgb;
     uint channel;
+    float passed;           // where masks are: probability to pass those between the last event and t_min
+    uint crossings;         // where masks are: how many the path has passed or met
     float far_end;          // where the far clip plane ends a camera ray
     // The shadow ray.
     vec3 next_direction;
@@ -62,6 +64,7 @@ struct Hit {
     vec3 tau_rgb;
     bool blocked;           // shadow rays: something is in the way
     uint medium;            // shadow rays to an emitting medium: the medium at the end of the ray
+    float passed;           // shadow rays, where masks are: fraction of the light that passes them
 };
 
 // The four numbers of a set.
@@ -101,6 +104,7 @@ float flight_end(Path path) {
 void begin_segment(inout Path path, vec2 u) {
     path.last = NONE;
     path.shadow = false;
+    path.passed = 1.0;
     if (HAS_MEDIA) {
         path.tau = 0.0;
         path.tau_left = minus_log_1m(u.x);
@@ -112,12 +116,13 @@ void begin_segment(inout Path path, vec2 u) {
     path.t_max = flight_end(path);
 }
 
-// Probability that the flight got as far as it did.
+// Probability that the flight got as far as it did, through media and masks.
 float survival(Path path) {
+    float passed = HAS_MASK ? path.passed : 1.0;
     if (!HAS_MEDIA) {
-        return 1.0;
+        return passed;
     }
-    return HAS_CHROMATIC ? survival_probability(channel_weights(path.throughput), path.tau_rgb) : exp_minus(path.tau);
+    return passed * (HAS_CHROMATIC ? survival_probability(channel_weights(path.throughput), path.tau_rgb) : exp_minus(path.tau));
 }
 
 vec3 survived_throughput(Path path) {

@@ -1,5 +1,6 @@
 // Where a path scatters: in a medium or on a surface.
 #include "lib/path_state.glsl"
+#include "lib/path_surface.glsl"
 #include "lib/warp.glsl"
 #include "lib/ray.glsl"
 #include "lib/phase.glsl"
@@ -15,7 +16,30 @@ struct Vertex {
     vec3 albedo;    // of the medium, with the weight of the flight
     Surface surface;
     vec3 incident;  // on a surface: towards where the path comes from, in the local frame
+    vec3 tangent;   // on a surface, where roughness depends on the direction: x of the local frame
+    vec3 normal;    // on a surface: the geometric normal, on the side of `axis`
 };
+
+// The components of a direction in the local frame of a surface, and back.
+vec3 to_surface_frame(vec3 tangent, vec3 axis, vec3 direction) {
+    if (HAS_ANISOTROPIC) {
+        return vec3(dot(tangent, direction), dot(cross(axis, tangent), direction), dot(axis, direction));
+    }
+    return to_frame(axis, direction);
+}
+
+vec3 from_surface_frame(vec3 tangent, vec3 axis, vec3 local) {
+    if (HAS_ANISOTROPIC) {
+        return normalize(tangent * local.x + cross(axis, tangent) * local.y + axis * local.z);
+    }
+    return from_frame(axis, local);
+}
+
+// Whether a direction lies on the same side of a surface and of its shading normal. One that does not would leak through the
+// surface, so the BSDF knows no such directions.
+bool sides_agree(Vertex vertex, float local_z, vec3 direction) {
+    return !HAS_SHADING_NORMALS || (local_z > 0.0) == (dot(vertex.normal, direction) > 0.0);
+}
 
 // Scattering function times cosine, and the density with which directions are sampled.
 BsdfValue eval_scattering(Vertex vertex, vec3 direction) {
@@ -27,7 +51,11 @@ BsdfValue eval_scattering(Vertex vertex, vec3 direction) {
         float phase = HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(vertex.g, vertex.axis, direction) : INV_4PI;
         return BsdfValue(vertex.albedo * phase, phase);
     }
-    return eval_bsdf(vertex.surface, vertex.incident, to_frame(vertex.axis, direction));
+    vec3 local = to_surface_frame(vertex.tangent, vertex.axis, direction);
+    if (!sides_agree(vertex, local.z, direction)) {
+        return BsdfValue(vec3(0.0), 0.0);
+    }
+    return eval_bsdf(vertex.surface, vertex.incident, local);
 }
 
 BsdfSample sample_scattering(Vertex vertex, vec2 u, float lobe) {
@@ -45,7 +73,12 @@ BsdfSample sample_scattering(Vertex vertex, vec2 u, float lobe) {
         return BsdfSample(direction, vertex.albedo, eval_scattering(vertex, direction).pdf, 1.0);
     }
     BsdfSample found = sample_bsdf(vertex.surface, vertex.incident, u, lobe);
-    found.direction = from_frame(vertex.axis, found.direction);
+    float side = found.direction.z;
+    found.direction = from_surface_frame(vertex.tangent, vertex.axis, found.direction);
+    if (!sides_agree(vertex, side, found.direction)) {
+        found.weight = vec3(0.0);
+        found.pdf = 0.0;
+    }
     return found;
 }
 
@@ -59,7 +92,7 @@ uint medium_towards(Vertex vertex, uint medium, vec3 direction) {
     if (!HAS_DIELECTRIC || vertex.in_medium || (vertex.surface.flags & SURFACE_ORIENTED) == 0u) {
         return medium;
     }
-    bool outwards = dot(vertex.axis, direction) > 0.0;
+    bool outwards = dot(vertex.normal, direction) > 0.0;
     if (outwards == (vertex.incident.z > 0.0) || vertex.surface.media == 0u) {
         return medium;
     }

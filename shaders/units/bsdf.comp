@@ -1,15 +1,16 @@
 // Unit kernel of lib/bsdf.glsl: (wi, which surface), (wo, lobe), (u, 0, 0) in; (sampled direction, density), (weight, index),
 // (value for wo, density), (Fresnel's reflectance at wi, cosine of refraction, masking of wi, of wo), (facet's normal, its
-// density) and (a conductor's reflectance at wi, 0) out. The masking is that of the facet which u samples.
+// density) and (a conductor's reflectance at wi, density of sampling the facet) out. The masking is that of the facet which u samples.
 #version 460
 #include "lib/layout.glsl"
 #include "lib/features.glsl"
-#include "lib/bsdf.glsl"
-
 layout(local_size_x = WORKGROUP) in;
 layout(set = 0, binding = 0, std430) readonly buffer Inputs { vec4 inputs[]; };
 layout(set = 0, binding = 1, std430) readonly buffer Surfaces { Surface surfaces[]; };
-layout(set = 0, binding = 2, std430) buffer Outputs { vec4 outputs[]; };
+layout(set = 0, binding = 2, std430) readonly buffer Values { float values[]; };
+#define VALUE(i) values[i]
+#include "lib/bsdf.glsl"
+layout(set = 0, binding = 3, std430) buffer Outputs { vec4 outputs[]; };
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -24,11 +25,12 @@ void main() {
     float cos_t;
     float fresnel = fresnel_dielectric(wi.z, surface.eta, cos_t);
     bool ggx = (surface.flags & SURFACE_GGX) != 0u;
-    vec3 m = sample_facet(u, surface.alpha, ggx);
+    vec2 alpha = roughness(surface);
+    vec3 m = sample_facet(wi, u, alpha, ggx);
     outputs[6u * i] = vec4(found.direction, found.pdf);
     outputs[6u * i + 1u] = vec4(found.weight, found.eta);
     outputs[6u * i + 2u] = vec4(asked.value, asked.pdf);
-    outputs[6u * i + 3u] = vec4(fresnel, cos_t, facet_masking(wi, m, surface.alpha, ggx), facet_masking(wo, m, surface.alpha, ggx));
-    outputs[6u * i + 4u] = vec4(m, facet_density(m, surface.alpha, ggx));
-    outputs[6u * i + 5u] = vec4(fresnel_conductor(abs(wi.z), surface.transmittance, surface.extinction), 0.0);
+    outputs[6u * i + 3u] = vec4(fresnel, cos_t, facet_masking(wi, m, alpha, ggx), facet_masking(wo, m, alpha, ggx));
+    outputs[6u * i + 4u] = vec4(m, facet_density(m, alpha, ggx));
+    outputs[6u * i + 5u] = vec4(fresnel_conductor(abs(wi.z), surface.transmittance, surface.extinction), facet_pdf(wi, m, alpha, ggx));
 }

@@ -35,12 +35,14 @@ sources! {
     "lib/path_lights.glsl",
     "lib/path_rays.glsl",
     "lib/path_state.glsl",
+    "lib/path_surface.glsl",
     "lib/path_vertex.glsl",
     "lib/phase.glsl",
     "lib/ray.glsl",
     "lib/rng.glsl",
     "lib/sampler.glsl",
     "lib/sky.glsl",
+    "lib/texture.glsl",
     "lib/warp.glsl",
     "units/bsdf.comp",
     "units/bvh.comp",
@@ -55,6 +57,7 @@ sources! {
     "units/rng.comp",
     "units/sampler.comp",
     "units/sky.comp",
+    "units/texture.comp",
     "units/warp.comp",
 }
 

@@ -63,6 +63,12 @@ pub fn bounds(primitive: &Primitive) -> (Vec3, Vec3) {
 impl Bvh {
     /// Builds the tree and returns it with the primitives in the order of its leaves.
     pub fn new(primitives: &[Primitive]) -> (Bvh, Vec<Primitive>) {
+        let (bvh, order) = Bvh::with_order(primitives);
+        (bvh, order.iter().map(|&index| primitives[index as usize]).collect())
+    }
+
+    /// Builds the tree and returns it with the indices of the primitives in the order of its leaves.
+    pub fn with_order(primitives: &[Primitive]) -> (Bvh, Vec<u32>) {
         assert!(primitives.len() <= MAX_PRIMITIVES, "the caller refuses larger scenes");
         if primitives.is_empty() {
             return (Bvh::empty(), Vec::new());
@@ -84,7 +90,6 @@ impl Bvh {
         let mut order = Vec::with_capacity(primitives.len());
         let mut leaf_starts = vec![0u32; tree.nodes.len()];
         number_leaves(&tree, &mut order, &mut leaf_starts);
-        let sorted = order.iter().map(|&index| primitives[index as usize]).collect();
 
         let node_count = count_nodes(&tree);
         let copies = if node_count * 16 * 8 <= MAX_COPIES_SIZE { 8 } else { 1 };
@@ -99,7 +104,7 @@ impl Bvh {
             grid_origin: grid.origin,
             grid_step: grid.step,
         };
-        (bvh, sorted)
+        (bvh, order)
     }
 
     /// A tree that no ray hits.

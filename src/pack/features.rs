@@ -49,6 +49,16 @@ pub struct Features {
     pub conductor: bool,
     /// A diffuse body under a varnish.
     pub plastic: bool,
+    /// A diffuse body under a rough varnish.
+    pub rough_plastic: bool,
+    /// Colours or an opacity that depend on the place.
+    pub textures: bool,
+    /// Roughness that depends on the direction.
+    pub anisotropic: bool,
+    /// Normals that are interpolated between the corners of triangles.
+    pub shading_normals: bool,
+    /// Surfaces with holes.
+    pub masks: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
     /// Emitters are not seen by the camera directly.
@@ -75,6 +85,7 @@ impl Features {
         let lowest = (1 << LIGHT_TEXTURE_SHIFT) - 1;
         let kind = |kind: u32| packed.lights.iter().any(|light| light.kind & lowest == kind);
         let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
+        let flag = |bit: u32| packed.surfaces.iter().any(|surface| surface.flags & bit != 0);
         let area_lights = kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD) || kind(LIGHT_SPHERE);
         let max_depth = max_depth.unwrap_or(u32::MAX);
         Features {
@@ -99,6 +110,11 @@ impl Features {
             dielectric: bsdf(BSDF_DIELECTRIC),
             conductor: bsdf(BSDF_CONDUCTOR),
             plastic: bsdf(BSDF_PLASTIC),
+            rough_plastic: packed.surfaces.iter().any(|surface| surface.value_count != 0),
+            textures: packed.surfaces.iter().any(|surface| surface.textures_1 | surface.textures_2 != 0),
+            anisotropic: packed.surfaces.iter().any(|surface| surface.alpha != surface.alpha_v),
+            shading_normals: flag(SURFACE_SMOOTH),
+            masks: flag(SURFACE_MASK),
             far_clip: {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
@@ -138,6 +154,11 @@ impl Features {
             dielectric: true,
             conductor: true,
             plastic: true,
+            rough_plastic: true,
+            textures: true,
+            anisotropic: true,
+            shading_normals: true,
+            masks: true,
             far_clip: true,
             ..self
         }
@@ -168,6 +189,12 @@ impl Features {
             ("HAS_CONDUCTOR", self.conductor),
             ("HAS_PLASTIC", self.plastic),
             ("HAS_LOBES", self.dielectric || self.conductor || self.plastic),
+            ("HAS_ROUGH_PLASTIC", self.rough_plastic),
+            ("HAS_TEXTURES", self.textures),
+            ("HAS_ANISOTROPIC", self.anisotropic),
+            ("HAS_UVS", self.textures || self.anisotropic),
+            ("HAS_SHADING_NORMALS", self.shading_normals),
+            ("HAS_MASK", self.masks),
             ("HAS_FAR_CLIP", self.far_clip),
             ("HAS_HIDDEN_EMITTERS", self.hide_emitters),
             ("HAS_LIGHT_SAMPLING", self.light_sampling),

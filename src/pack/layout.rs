@@ -137,8 +137,16 @@ gpu_struct! {
         alpha_v: f32,
         /// Textures that stand for `reflectance` (low 16 bits) and `specular` (high 16 bits), plus one; 0 is none.
         textures_1: u32,
-        /// Textures of `transmittance` (low 16 bits) and of the opacity (high 16 bits), plus one; 0 is none.
+        /// Textures of `transmittance` (low 16 bits) and of `opacity` (high 16 bits), plus one; 0 is none.
         textures_2: u32,
+        /// Of a mask, the probability that light meets the surface at all.
+        opacity: f32,
+        /// Of rough plastic: index among the values of what its varnish lets through, at cosines from 0 to 1.
+        first_value: u32,
+        /// Of rough plastic: values from there on.
+        value_count: u32,
+        /// Fills the sixteen bytes.
+        unused: u32,
     }
 }
 
@@ -360,6 +368,12 @@ pub const SURFACE_THIN: u32 = 4;
 pub const SURFACE_NONLINEAR: u32 = 8;
 /// Bit 4: the two sides differ, and directions are those of the outside.
 pub const SURFACE_ORIENTED: u32 = 16;
+/// Bit 5: light meets the surface with a probability only, and else goes straight on.
+pub const SURFACE_MASK: u32 = 32;
+/// Bit 6: the corners of the triangles have shading normals.
+pub const SURFACE_SMOOTH: u32 = 64;
+/// Bit 7: texture coordinates are needed.
+pub const SURFACE_UVS: u32 = 128;
 /// Where the kind of BSDF begins in [`Surface::flags`].
 pub const SURFACE_KIND_SHIFT: u32 = 8;
 /// Kind of BSDF: Lambert's law.
@@ -376,6 +390,16 @@ pub const PHASE_HENYEY_GREENSTEIN: u32 = 0;
 pub const PHASE_RAYLEIGH: u32 = 1;
 /// [`Phase::kind`]: a table.
 pub const PHASE_TABULATED: u32 = 2;
+/// [`Texture::kind`]: an image.
+pub const TEXTURE_BITMAP: u32 = 0;
+/// [`Texture::kind`]: a pattern of squares.
+pub const TEXTURE_CHECKERBOARD: u32 = 1;
+/// Bit 0 of [`Texture::flags`]: the nearest pixel counts alone.
+pub const TEXTURE_NEAREST: u32 = 1;
+/// Bit 1: outside of the unit square the image is repeated, mirrored every other time.
+pub const TEXTURE_MIRROR: u32 = 2;
+/// Bit 2: outside of the unit square the pixels at the edge go on. With neither bit, the image is repeated.
+pub const TEXTURE_CLAMP: u32 = 4;
 /// [`Light::kind`]: a triangle.
 pub const LIGHT_TRIANGLE: u32 = 0;
 /// [`Light::kind`]: a parallelogram.
@@ -426,6 +450,9 @@ pub fn glsl() -> String {
         ("SURFACE_THIN", SURFACE_THIN),
         ("SURFACE_NONLINEAR", SURFACE_NONLINEAR),
         ("SURFACE_ORIENTED", SURFACE_ORIENTED),
+        ("SURFACE_MASK", SURFACE_MASK),
+        ("SURFACE_SMOOTH", SURFACE_SMOOTH),
+        ("SURFACE_UVS", SURFACE_UVS),
         ("SURFACE_KIND_SHIFT", SURFACE_KIND_SHIFT),
         ("BSDF_DIFFUSE", BSDF_DIFFUSE),
         ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),
@@ -434,6 +461,11 @@ pub fn glsl() -> String {
         ("PHASE_HENYEY_GREENSTEIN", PHASE_HENYEY_GREENSTEIN),
         ("PHASE_RAYLEIGH", PHASE_RAYLEIGH),
         ("PHASE_TABULATED", PHASE_TABULATED),
+        ("TEXTURE_BITMAP", TEXTURE_BITMAP),
+        ("TEXTURE_CHECKERBOARD", TEXTURE_CHECKERBOARD),
+        ("TEXTURE_NEAREST", TEXTURE_NEAREST),
+        ("TEXTURE_MIRROR", TEXTURE_MIRROR),
+        ("TEXTURE_CLAMP", TEXTURE_CLAMP),
         ("LIGHT_TRIANGLE", LIGHT_TRIANGLE),
         ("LIGHT_QUAD", LIGHT_QUAD),
         ("LIGHT_SPHERE", LIGHT_SPHERE),

@@ -1,6 +1,6 @@
 //! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
 
-use crate::scene::{self, Bsdf, Geometry, MediumId, Scene, Shape};
+use crate::scene::{self, Geometry, MediumId, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
@@ -16,6 +16,7 @@ pub mod phase;
 pub mod sky;
 pub mod sobol;
 mod support;
+pub mod texture;
 
 use bvh::Bvh;
 use features::Features;
@@ -23,6 +24,7 @@ use frame::Frame;
 use layout::*;
 use lights::LightTable;
 use nesting::Nesting;
+use texture::TextureTable;
 
 /// A scene as tables.
 #[derive(Clone, Debug)]
@@ -88,6 +90,17 @@ pub enum PackError {
         /// Its value.
         value: f64,
     },
+    /// More textures than a surface can name.
+    #[error("{0} textures are more than the {max} that a scene can hold", max = texture::MAX_TEXTURES)]
+    TooManyTextures(usize),
+    /// A surface that depends on the place, but does not say where its places are.
+    #[error("\"{name}\" has {why}, but no texture coordinates")]
+    MissingUvs {
+        /// What needs them.
+        why: &'static str,
+        /// Of which shape.
+        name: String,
+    },
     /// More pixels and other numbers than 32 bits can count.
     #[error("pixels and tables of {0} numbers are more than the {max} that a scene can hold", max = u32::MAX)]
     TooManyValues(usize),
@@ -115,7 +128,7 @@ const MAX_MEDIA: usize = 65535;
 impl Packed {
     /// Makes the tables.
     pub fn new(scene: &Scene, seed: u32) -> Result<Packed, PackError> {
-        let simplified = support::check(scene)?;
+        support::check(scene)?;
         let frame = Frame::of(scene);
         let nesting = Nesting::of(scene);
         if scene.media.len() > MAX_MEDIA {
@@ -126,22 +139,41 @@ impl Packed {
         let mut surfaces = Vec::with_capacity(scene.shapes.len());
         let mut primitives = Vec::new();
         let mut lights = LightTable::default();
+        let mut textures = TextureTable::default();
+        let mut corners = Vec::new();
         for (index, shape) in scene.shapes.iter().enumerate() {
-            let surface = pack_surface(shape, nesting.exteriors[index], &media);
+            let surface = pack_surface(shape, nesting.exteriors[index], &media, &mut textures, &mut values);
+            let first = primitives.len();
             pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights);
+            if surface.flags & (SURFACE_SMOOTH | SURFACE_UVS) != 0 {
+                corners.resize(first, Corners::default());
+                corners.extend(texture::corners(shape));
+                assert_eq!(corners.len(), primitives.len(), "one entry for each primitive");
+            }
             surfaces.push(surface);
+        }
+        let mut textures = textures.textures;
+        if textures.len() > texture::MAX_TEXTURES {
+            return Err(PackError::TooManyTextures(textures.len()));
+        }
+        if u32::try_from(values.len()).is_err() {
+            return Err(PackError::TooManyValues(values.len()));
         }
         if primitives.len() > bvh::MAX_PRIMITIVES {
             return Err(PackError::TooManyPrimitives(primitives.len()));
         }
-        let mut textures = Vec::new();
         for (index, medium) in media.iter_mut().enumerate().skip(1) {
             if let Some(volume) = emission::enclosing_volume(scene, &frame, MediumId(index as u32 - 1)) {
                 medium.light = lights.add_volume(volume, index as u32, medium.emission) + 1;
             }
         }
         let first_sky = pack_lights(scene, &frame, &mut lights, &mut textures, &mut values)?;
-        let (bvh, primitives) = Bvh::new(&primitives);
+        let (bvh, order) = Bvh::with_order(&primitives);
+        if !corners.is_empty() {
+            corners.resize(primitives.len(), Corners::default());
+            corners = order.iter().map(|&index| corners[index as usize]).collect();
+        }
+        let primitives: Vec<Primitive> = order.iter().map(|&index| primitives[index as usize]).collect();
         let lights = lights.finish();
         flight::choose_equiangular(scene, &nesting, &frame, &lights, &mut media);
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
@@ -157,9 +189,8 @@ impl Packed {
             film_width: scene.film.width,
             ..params
         };
-        let warnings = [nesting.warnings, simplified].concat();
+        let warnings = nesting.warnings;
         let features = EMPTY_FEATURES;
-        let corners = Vec::new();
         let mut packed = Packed {
             frame,
             bvh,
@@ -208,6 +239,11 @@ const EMPTY_FEATURES: Features = Features {
     dielectric: false,
     conductor: false,
     plastic: false,
+    rough_plastic: false,
+    textures: false,
+    anisotropic: false,
+    shading_normals: false,
+    masks: false,
     far_clip: false,
     hide_emitters: false,
     light_sampling: false,
@@ -246,15 +282,26 @@ fn pack_media(
     Ok(media)
 }
 
-fn pack_surface(shape: &Shape, exterior: Option<MediumId>, media: &[Medium]) -> Surface {
+fn pack_surface(
+    shape: &Shape,
+    exterior: Option<MediumId>,
+    media: &[Medium],
+    textures: &mut TextureTable,
+    values: &mut Vec<f32>,
+) -> Surface {
     let (inside, outside) = match shape.boundary {
         Some(boundary) => (medium_index(boundary.interior), medium_index(exterior)),
         None => (0, 0),
     };
+    let material = material::pack(&shape.bsdf, textures, values);
+    let smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
+    let smooth = if smooth && !material::is_null(&shape.bsdf) { SURFACE_SMOOTH } else { 0 };
+    let uvs = if shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };
     Surface {
+        flags: material.flags | smooth | uvs,
         sigma_t_step: media[inside as usize].sigma_t - media[outside as usize].sigma_t,
         media: inside | outside << 16,
-        ..material::pack(&shape.bsdf)
+        ..material
     }
 }
 
@@ -267,7 +314,7 @@ fn pack_shape(
     primitives: &mut Vec<Primitive>,
     lights: &mut LightTable,
 ) {
-    let crossed = shape.bsdf == Bsdf::Null;
+    let crossed = material::is_null(&shape.bsdf);
     if crossed && shape.boundary.is_none() && shape.emission.is_none() {
         return; // Neither seen nor felt.
     }

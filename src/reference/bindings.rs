@@ -22,7 +22,7 @@ pub struct Tables {
     /// One for each primitive, or none at all.
     pub corners: Vec<layout::Corners>,
     /// Images and patterns.
-    pub textures: Vec<layout::Texture>,
+    pub textures: Vec<Texture>,
     /// Pixels, tabulated functions, distributions.
     pub values: Vec<f32>,
     /// Low-discrepancy points.
@@ -62,6 +62,9 @@ pub struct Surface {
     pub alpha_v: f64,
     pub textures_1: u32,
     pub textures_2: u32,
+    pub opacity: f64,
+    pub first_value: u32,
+    pub value_count: u32,
 }
 
 /// See [`layout::Medium`].
@@ -77,6 +80,22 @@ pub struct Medium {
     pub least_sigma_t: f64,
     pub equiangular: f64,
     pub collision_share: f64,
+}
+
+/// See [`layout::Texture`].
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs, reason = "the members are documented in `layout`")]
+pub struct Texture {
+    pub row_u: DVec3,
+    pub kind: u32,
+    pub row_v: DVec3,
+    pub flags: u32,
+    pub color_0: DVec3,
+    pub width: u32,
+    pub color_1: DVec3,
+    pub height: u32,
+    pub first_value: u32,
+    pub first_weight: u32,
 }
 
 /// See [`layout::Light`].
@@ -132,7 +151,7 @@ impl Tables {
             lights: packed.lights.iter().map(Light::from).collect(),
             phases: packed.phases.clone(),
             corners: packed.corners.clone(),
-            textures: packed.textures.clone(),
+            textures: packed.textures.iter().map(Texture::from).collect(),
             values: packed.values.clone(),
             points: sobol::points(),
             params: Params::from(&packed.params),
@@ -181,6 +200,9 @@ impl From<&layout::Surface> for Surface {
             alpha_v: f64::from(from.alpha_v),
             textures_1: from.textures_1,
             textures_2: from.textures_2,
+            opacity: f64::from(from.opacity),
+            first_value: from.first_value,
+            value_count: from.value_count,
         }
     }
 }
@@ -197,6 +219,23 @@ impl From<&layout::Medium> for Medium {
             least_sigma_t: f64::from(from.least_sigma_t),
             equiangular: f64::from(from.equiangular),
             collision_share: f64::from(from.collision_share),
+        }
+    }
+}
+
+impl From<&layout::Texture> for Texture {
+    fn from(from: &layout::Texture) -> Texture {
+        Texture {
+            row_u: from.row_u.as_dvec3(),
+            kind: from.kind,
+            row_v: from.row_v.as_dvec3(),
+            flags: from.flags,
+            color_0: from.color_0.as_dvec3(),
+            width: from.width,
+            color_1: from.color_1.as_dvec3(),
+            height: from.height,
+            first_value: from.first_value,
+            first_weight: from.first_weight,
         }
     }
 }

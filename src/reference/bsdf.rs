@@ -68,47 +68,67 @@ pub fn fresnel_conductor(cos_i: f64, eta: DVec3, k: DVec3) -> DVec3 {
     0.5 * (s + p)
 }
 
-/// Density of microfacet normals with z > 0, 1/sr. Beckmann (1963) or GGX (Walter et al. 2007).
-pub fn facet_density(m: DVec3, alpha: f64, ggx: bool) -> f64 {
+/// Density of microfacet normals with z > 0, 1/sr; `alpha` is the roughness along tangent and bitangent. Beckmann (1963) or GGX
+/// (Walter et al. 2007), in their anisotropic forms (Heitz 2014, equations 79 and 85).
+pub fn facet_density(m: DVec3, alpha: DVec2, ggx: bool) -> f64 {
     if m.z <= 0.0 {
         return 0.0;
     }
-    let (c2, s2) = (m.z * m.z, m.x * m.x + m.y * m.y);
-    let a2 = alpha * alpha;
+    let (c2, s2) = (m.z * m.z, (m.truncate() / alpha).length_squared());
     if ggx {
-        let d = a2 * c2 + s2;
-        return a2 / (PI * d * d);
+        let d = c2 + s2;
+        return 1.0 / (PI * alpha.x * alpha.y * d * d);
     }
-    let shape = exp_minus(s2 / (a2 * c2));
-    if shape > 0.0 { shape / (PI * a2 * c2 * c2) } else { 0.0 }
+    let shape = exp_minus(s2 / c2);
+    if shape > 0.0 { shape / (PI * alpha.x * alpha.y * c2 * c2) } else { 0.0 }
 }
 
 /// Smith's masking of direction v for facets with normal m.
-pub fn facet_masking(v: DVec3, m: DVec3, alpha: f64, ggx: bool) -> f64 {
+pub fn facet_masking(v: DVec3, m: DVec3, alpha: DVec2, ggx: bool) -> f64 {
     if v.dot(m) * v.z <= 0.0 {
         return 0.0;
     }
-    let tan2 = (v.x * v.x + v.y * v.y) / (v.z * v.z);
+    let tan2 = (v.truncate() * alpha).length_squared() / (v.z * v.z);
     if tan2 == 0.0 {
         return 1.0;
     }
     if ggx {
-        return 2.0 / (1.0 + (1.0 + alpha * alpha * tan2).sqrt());
+        return 2.0 / (1.0 + (1.0 + tan2).sqrt());
     }
-    let a = 1.0 / (alpha * tan2.sqrt());
+    let a = 1.0 / tan2.sqrt();
     if a >= 1.6 { 1.0 } else { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) }
 }
 
-/// A facet normal with density [`facet_density`] times its z.
-pub fn sample_facet(u: DVec2, alpha: f64, ggx: bool) -> DVec3 {
-    let tan2 = alpha * alpha * if ggx { u.x / (1.0 - u.x) } else { minus_log_1m(u.x) };
-    let c = 1.0 / (1.0 + tan2).sqrt();
-    from_polar(c, tan2.sqrt() * c, u.y)
+/// A facet normal with density [`facet_pdf`]: of GGX those that w sees (Dupuy and Benyoub 2023), of Beckmann all.
+pub fn sample_facet(w: DVec3, u: DVec2, alpha: DVec2, ggx: bool) -> DVec3 {
+    if !ggx {
+        let (sin_phi, cos_phi) = (2.0 * PI * u.y).sin_cos();
+        let slope = minus_log_1m(u.x).sqrt() * alpha * DVec2::new(cos_phi, sin_phi);
+        let c = 1.0 / (1.0 + slope.length_squared()).sqrt();
+        return (slope * c).extend(c);
+    }
+    let v = (alpha * w.truncate()).extend(w.z).normalize();
+    let v = if w.z < 0.0 { -v } else { v };
+    let height = 1.0 + v.z;
+    let (down, up) = (u.x * height, (1.0 - u.x) * height + v.truncate().length_squared() / height);
+    let cap = from_polar(1.0 - down, (down * up).sqrt(), u.y);
+    (alpha * (cap + v).truncate()).extend(height * (1.0 - u.x)).normalize()
+}
+
+/// Density of [`sample_facet`], 1/sr (Heitz 2014, equation 15).
+pub fn facet_pdf(w: DVec3, m: DVec3, alpha: DVec2, ggx: bool) -> f64 {
+    let density = facet_density(m, alpha, ggx);
+    if ggx { density * facet_masking(w, m, alpha, ggx) * (w.dot(m) / w.z).abs() } else { density * m.z }
 }
 
 /// One of the `BSDF_` constants.
 pub fn bsdf_kind(surface: &Surface) -> u32 {
     surface.flags >> SURFACE_KIND_SHIFT
+}
+
+/// Roughness along tangent and bitangent.
+pub fn roughness(surface: &Surface) -> DVec2 {
+    DVec2::new(surface.alpha, surface.alpha_v)
 }
 
 fn is_ggx(surface: &Surface) -> bool {
@@ -126,59 +146,71 @@ pub fn refract_at(w: DVec3, m: DVec3, cos_t: f64, eta: f64) -> DVec3 {
     m * (c * scale + cos_t) - w * scale
 }
 
-/// The diffuse lobe of plastic.
-fn plastic_diffuse(surface: &Surface, fresnel_i: f64, fresnel_o: f64) -> DVec3 {
+/// Fraction of light from outside that the varnish of plastic lets through: of a rough one, from a table over the cosine.
+pub fn coat_transmittance(surface: &Surface, values: &[f32], cosine: f64) -> f64 {
+    if surface.value_count != 0 {
+        let place = cosine * f64::from(surface.value_count - 1);
+        let entry = (place as u32).min(surface.value_count - 2);
+        let value = |entry: u32| f64::from(values[(surface.first_value + entry) as usize]);
+        let (low, high) = (value(entry), value(entry + 1));
+        return low + (high - low) * (place - f64::from(entry));
+    }
+    1.0 - fresnel_dielectric(cosine, surface.eta).0
+}
+
+/// The diffuse lobe of plastic, whose varnish lets the fractions `through_i` and `through_o` through.
+fn plastic_diffuse(surface: &Surface, through_i: f64, through_o: f64) -> DVec3 {
     let body = surface.reflectance;
     let nonlinear = surface.flags & SURFACE_NONLINEAR != 0;
     let internal = if nonlinear { body } else { DVec3::ONE } * surface.internal_reflectance;
-    body / (DVec3::ONE - internal) * ((1.0 - fresnel_i) * (1.0 - fresnel_o) / (surface.eta * surface.eta))
+    body / (DVec3::ONE - internal) * (through_i * through_o / (surface.eta * surface.eta))
 }
 
 /// Probability of plastic's specular lobe.
-fn plastic_specular_probability(surface: &Surface, fresnel_i: f64) -> f64 {
-    let specular = fresnel_i * surface.specular_weight;
-    specular / (specular + (1.0 - fresnel_i) * (1.0 - surface.specular_weight)).max(1e-30)
+fn plastic_specular_probability(surface: &Surface, through_i: f64) -> f64 {
+    let specular = (1.0 - through_i) * surface.specular_weight;
+    specular / (specular + through_i * (1.0 - surface.specular_weight)).max(1e-30)
 }
 
-/// Density of the facet's normal, and Smith's shadowing and masking of both directions.
-fn facet_terms(surface: &Surface, wi: DVec3, wo: DVec3, m: DVec3) -> (f64, f64) {
-    let (alpha, ggx) = (surface.alpha, is_ggx(surface));
-    (facet_density(m, alpha, ggx), facet_masking(wi, m, alpha, ggx) * facet_masking(wo, m, alpha, ggx))
+/// Density of the facet's normal, Smith's shadowing and masking of both directions, and the density of sampling the facet.
+fn facet_terms(surface: &Surface, wi: DVec3, wo: DVec3, m: DVec3) -> (f64, f64, f64) {
+    let (alpha, ggx) = (roughness(surface), is_ggx(surface));
+    let masking = facet_masking(wi, m, alpha, ggx) * facet_masking(wo, m, alpha, ggx);
+    (facet_density(m, alpha, ggx), masking, facet_pdf(wi, m, alpha, ggx))
 }
 
-/// The BSDF times cosine, and the density of wo.
-pub fn eval_bsdf(surface: &Surface, wi: DVec3, wo: DVec3) -> BsdfValue {
+/// The BSDF times cosine, and the density of wo. `values` holds the tables of surfaces.
+pub fn eval_bsdf(surface: &Surface, values: &[f32], wi: DVec3, wo: DVec3) -> BsdfValue {
     let above = wi.z > 0.0 && wo.z > 0.0;
     match bsdf_kind(surface) {
         BSDF_DIFFUSE if above => {
             let pdf = wo.z * FRAC_1_PI;
             BsdfValue { value: surface.reflectance * pdf, pdf }
         }
-        BSDF_PLASTIC if above => eval_plastic(surface, wi, wo),
+        BSDF_PLASTIC if above => eval_plastic(surface, values, wi, wo),
         BSDF_CONDUCTOR if above && surface.alpha > 0.0 => {
             let m = (wi + wo).normalize();
-            let (density, masking) = facet_terms(surface, wi, wo, m);
+            let (density, masking, facets) = facet_terms(surface, wi, wo, m);
             let f = fresnel_conductor(wi.dot(m), surface.transmittance, surface.extinction);
             let value = surface.specular * f * (density * masking / (4.0 * wi.z));
-            BsdfValue { value, pdf: density * m.z / (4.0 * wi.dot(m)) }
+            BsdfValue { value, pdf: facets / (4.0 * wi.dot(m)) }
         }
         BSDF_DIELECTRIC if surface.alpha > 0.0 => eval_rough_dielectric(surface, wi, wo),
         _ => BsdfValue::default(),
     }
 }
 
-fn eval_plastic(surface: &Surface, wi: DVec3, wo: DVec3) -> BsdfValue {
-    let (fresnel_i, _) = fresnel_dielectric(wi.z, surface.eta);
-    let (fresnel_o, _) = fresnel_dielectric(wo.z, surface.eta);
-    let diffuse_probability = 1.0 - plastic_specular_probability(surface, fresnel_i);
-    let mut value = plastic_diffuse(surface, fresnel_i, fresnel_o) * (wo.z * FRAC_1_PI);
+fn eval_plastic(surface: &Surface, values: &[f32], wi: DVec3, wo: DVec3) -> BsdfValue {
+    let [through_i, through_o] = [wi.z, wo.z].map(|cosine| coat_transmittance(surface, values, cosine));
+    let diffuse_probability = 1.0 - plastic_specular_probability(surface, through_i);
+    let mut value = plastic_diffuse(surface, through_i, through_o) * (wo.z * FRAC_1_PI);
     let mut pdf = diffuse_probability * wo.z * FRAC_1_PI;
     if surface.alpha > 0.0 {
         let m = (wi + wo).normalize();
-        let (density, masking) = facet_terms(surface, wi, wo, m);
+        let (density, masking, facets) = facet_terms(surface, wi, wo, m);
         let (f, _) = fresnel_dielectric(wi.dot(m), surface.eta);
         value += surface.specular * (f * density * masking / (4.0 * wi.z));
-        pdf += (1.0 - diffuse_probability) * density * m.z / (4.0 * wi.dot(m));
+        pdf += (1.0 - diffuse_probability) * facets / (4.0 * wi.dot(m));
     }
     BsdfValue { value, pdf }
 }
@@ -196,16 +228,16 @@ fn eval_rough_dielectric(surface: &Surface, wi: DVec3, wo: DVec3) -> BsdfValue {
     if ci * wi.z <= 0.0 || co * wo.z <= 0.0 {
         return BsdfValue::default();
     }
-    let (density, masking) = facet_terms(surface, wi, wo, m);
+    let (density, masking, facets) = facet_terms(surface, wi, wo, m);
     let (f, _) = fresnel_dielectric(ci, surface.eta);
     if reflects {
         let value = surface.specular * (f * density * masking / (4.0 * wi.z.abs()));
-        return BsdfValue { value, pdf: f * density * m.z / (4.0 * ci.abs()) };
+        return BsdfValue { value, pdf: f * facets / (4.0 * ci.abs()) };
     }
     // The Jacobian η² |co| / (ci + η co)²; radiance divides it by η².
     let jacobian = co.abs() / ((ci + eta * co) * (ci + eta * co));
     let value = surface.transmittance * ((1.0 - f) * density * masking * jacobian * (ci / wi.z).abs());
-    BsdfValue { value, pdf: (1.0 - f) * density * m.z * jacobian * eta * eta }
+    BsdfValue { value, pdf: (1.0 - f) * facets * jacobian * eta * eta }
 }
 
 fn sample_smooth_dielectric(surface: &Surface, wi: DVec3, lobe: f64) -> BsdfSample {
@@ -225,8 +257,8 @@ fn sample_smooth_dielectric(surface: &Surface, wi: DVec3, lobe: f64) -> BsdfSamp
     BsdfSample { direction, weight: surface.transmittance / (eta * eta), pdf: 0.0, eta }
 }
 
-/// Samples a direction. `u` chooses within a lobe, `lobe` between them.
-pub fn sample_bsdf(surface: &Surface, wi: DVec3, u: DVec2, lobe: f64) -> BsdfSample {
+/// Samples a direction. `u` chooses within a lobe, `lobe` between them; `values` holds the tables of surfaces.
+pub fn sample_bsdf(surface: &Surface, values: &[f32], wi: DVec3, u: DVec2, lobe: f64) -> BsdfSample {
     let kind = bsdf_kind(surface);
     let mut found = NO_SAMPLE;
     if kind == BSDF_DIFFUSE {
@@ -248,18 +280,22 @@ pub fn sample_bsdf(surface: &Surface, wi: DVec3, u: DVec2, lobe: f64) -> BsdfSam
         return BsdfSample { direction: reflect_z(wi), weight: surface.specular * f, ..NO_SAMPLE };
     }
     if kind == BSDF_PLASTIC {
-        let (f, _) = fresnel_dielectric(wi.z, surface.eta);
-        let p = plastic_specular_probability(surface, f);
+        let through = coat_transmittance(surface, values, wi.z);
+        let p = plastic_specular_probability(surface, through);
         if lobe >= p {
             found.direction = square_to_cosine_hemisphere(u);
         } else if surface.alpha == 0.0 {
-            return BsdfSample { direction: reflect_z(wi), weight: surface.specular * (f / p), ..NO_SAMPLE };
+            return BsdfSample {
+                direction: reflect_z(wi),
+                weight: surface.specular * ((1.0 - through) / p),
+                ..NO_SAMPLE
+            };
         } else {
-            let m = sample_facet(u, surface.alpha, is_ggx(surface));
+            let m = sample_facet(wi, u, roughness(surface), is_ggx(surface));
             found.direction = 2.0 * wi.dot(m) * m - wi;
         }
     } else {
-        let m = sample_facet(u, surface.alpha, is_ggx(surface));
+        let m = sample_facet(wi, u, roughness(surface), is_ggx(surface));
         found.direction = 2.0 * wi.dot(m) * m - wi;
         if kind == BSDF_DIELECTRIC {
             // A facet that is seen from behind is none.
@@ -278,7 +314,7 @@ pub fn sample_bsdf(surface: &Surface, wi: DVec3, u: DVec2, lobe: f64) -> BsdfSam
             }
         }
     }
-    let BsdfValue { value, pdf } = eval_bsdf(surface, wi, found.direction);
+    let BsdfValue { value, pdf } = eval_bsdf(surface, values, wi, found.direction);
     if pdf <= 0.0 {
         return NO_SAMPLE;
     }

@@ -18,12 +18,14 @@ pub mod path_flight;
 pub mod path_lights;
 pub mod path_rays;
 pub mod path_state;
+pub mod path_surface;
 pub mod path_vertex;
 pub mod phase;
 pub mod ray;
 pub mod rng;
 pub mod sampler;
 pub mod sky;
+pub mod texture;
 pub mod warp;
 
 use crate::pack::Packed;

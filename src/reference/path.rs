@@ -4,20 +4,27 @@
 use super::bindings::{Medium, Surface, Tables};
 use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
-use super::math::{exp_minus_rgb, max_component, to_frame};
+use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::channel_weights;
 use super::path_flight::{end_flight, enter_medium, flight_point, free_way, near_distance};
 use super::path_lights::{add_emission, add_medium_emission, add_sky, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_set, survived_throughput};
-use super::path_vertex::{Vertex, medium_towards, offset_origin, sample_scattering, surface_point};
+use super::path_surface::{Place, apply_textures, opacity_at, shading_normal, surface_tangent, texture_coordinates};
+use super::path_vertex::{
+    Vertex, medium_towards, offset_origin, sample_scattering, sides_agree, surface_point, to_surface_frame,
+};
 use super::ray::offset_distance;
-use crate::pack::layout::{LIGHT_VOLUME, PRIMITIVE_BOUNDARY, SURFACE_ORIENTED, SURFACE_TWO_SIDED};
+use crate::pack::layout::{
+    LIGHT_VOLUME, PRIMITIVE_BOUNDARY, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
+};
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
 /// Depth at which roulette begins to end paths that lose nothing.
 const RELENTLESS_DEPTH: u32 = 256;
+/// The sets of random numbers by which light meets masks or passes them begin here.
+const MASK_SETS: u32 = 0x8000_0000;
 
 /// A ray from the camera, and a free flight for its first segment.
 pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
@@ -89,6 +96,29 @@ fn next_segment(tables: &Tables, path: &mut Path) {
     begin_segment(tables, path, u.zw());
 }
 
+/// Goes straight on through a surface.
+fn cross_surface(tables: &Tables, path: &mut Path, surface: &Surface, hit: &Hit) {
+    let (inside, outside) = (surface.media & 0xffff, surface.media >> 16);
+    let (from, to) = if hit.along_normal { (inside, outside) } else { (outside, inside) };
+    let again = path.last != NONE && hit.t - path.t_min < near_distance(path, hit.t);
+    enter_medium(tables, path, from, to, again);
+    path.t_min = hit.t;
+    path.last = hit.primitive;
+    path.last_along_normal = hit.along_normal;
+    path.anchor = surface_point(tables.primitive(hit.primitive), path, hit).0;
+    path.tau_left = path.tau_left.max(0.0);
+    path.t_max = flight_end(tables, path);
+}
+
+/// Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
+fn passes_mask(tables: &Tables, path: &mut Path, surface: &Surface, place: &Place) -> bool {
+    let opacity = opacity_at(tables, surface, place);
+    let u = sample_set(tables, path, MASK_SETS + path.crossings).x;
+    path.crossings += 1;
+    path.passed *= 1.0 - opacity;
+    u >= opacity
+}
+
 /// Answers a ray that extends the path.
 pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
     let surface_hit = hit.primitive != NONE && hit.t < path.t_max;
@@ -104,7 +134,9 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         path.normal = path.direction;
         let (axis, surface, incident) = (path.direction, Surface::default(), DVec3::ZERO);
         let Medium { g, phase, .. } = medium;
-        let vertex = Vertex { point, axis, in_medium: true, g, phase, albedo: end.weight, surface, incident };
+        let (tangent, normal) = (DVec3::ZERO, DVec3::ZERO);
+        let albedo = end.weight;
+        let vertex = Vertex { point, axis, in_medium: true, g, phase, albedo, surface, incident, tangent, normal };
         scatter(tables, path, &vertex);
     } else {
         // The optical depth of the way through the medium since `t_min`.
@@ -120,20 +152,17 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         let primitive = tables.primitive(hit.primitive);
         let surface = tables.surface_of(primitive);
         if primitive.surface & PRIMITIVE_BOUNDARY != 0 {
-            let (inside, outside) = (surface.media & 0xffff, surface.media >> 16);
-            let (from, to) = if hit.along_normal { (inside, outside) } else { (outside, inside) };
-            let again = path.last != NONE && t - path.t_min < near_distance(path, t);
-            enter_medium(tables, path, from, to, again);
-            path.t_min = t;
-            path.last = hit.primitive;
-            path.last_along_normal = hit.along_normal;
-            path.anchor = surface_point(primitive, path, hit).0;
-            path.tau_left = path.tau_left.max(0.0);
-            path.t_max = flight_end(tables, path);
+            cross_surface(tables, path, surface, hit);
             return;
         }
         let (point, normal, largest) = surface_point(primitive, path, hit);
         add_emission(tables, path, primitive, t, normal);
+        let Hit { barycentric, .. } = *hit;
+        let mut place = Place { index: hit.primitive, point: path.origin + path.direction * t, barycentric };
+        if surface.flags & SURFACE_MASK != 0 && passes_mask(tables, path, surface, &place) {
+            cross_surface(tables, path, surface, hit);
+            return;
+        }
         path.throughput = survived_throughput(path);
         let back = path.direction.dot(normal) > 0.0;
         if back && surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED) == 0 {
@@ -141,15 +170,29 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
             path.shadow = false;
             return;
         }
-        let axis = if back && surface.flags & SURFACE_ORIENTED == 0 { -normal } else { normal };
+        place.point = point;
+        let turned = back && surface.flags & SURFACE_ORIENTED == 0;
+        let smooth = surface.flags & SURFACE_SMOOTH != 0;
+        let axis = if smooth { shading_normal(tables, &place, normal) } else { normal };
+        let (axis, normal) = if turned { (-axis, -normal) } else { (axis, normal) };
+        let isotropic = surface.alpha == surface.alpha_v;
+        let tangent = if isotropic { orthonormal_frame(axis).0 } else { surface_tangent(tables, &place, axis) };
+        let mut surface = *surface;
+        if surface.textures_1 | surface.textures_2 & 0xffff != 0 {
+            apply_textures(tables, &mut surface, texture_coordinates(tables, &place));
+        }
         path.offset = offset_distance(largest);
-        path.normal = axis;
-        let (surface, incident) = (*surface, to_frame(axis, -path.direction));
-        scatter(
-            tables,
-            path,
-            &Vertex { point, axis, in_medium: false, g: 0.0, phase: 0, albedo: DVec3::ZERO, surface, incident },
-        );
+        path.normal = normal;
+        let incident = to_surface_frame(tangent, axis, -path.direction);
+        let (in_medium, g, phase, albedo) = (false, 0.0, 0, DVec3::ZERO);
+        let vertex = Vertex { point, axis, in_medium, g, phase, albedo, surface, incident, tangent, normal };
+        if !sides_agree(&vertex, incident.z, -path.direction) {
+            // The surface is seen from one side, its shading normal from the other one: nothing is reflected.
+            path.alive = false;
+            path.shadow = false;
+            return;
+        }
+        scatter(tables, path, &vertex);
     }
     if !path.shadow && path.alive {
         next_segment(tables, path);
@@ -159,7 +202,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
 /// Answers a shadow ray.
 pub fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
     if !hit.blocked {
-        let mut transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
+        let mut transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO)) * hit.passed;
         let mut survives = channel_weights(path.light_channels).dot(transmittance);
         let light = &tables.lights[path.light as usize];
         if light.kind == LIGHT_VOLUME {

@@ -1,6 +1,6 @@
 //! Mirror of `shaders/lib/path_lights.glsl`: how a path comes to light, by chance or by light sampling.
 
-use super::bindings::{Light, Medium, Primitive, Tables};
+use super::bindings::{Light, Medium, Primitive, Tables, Texture};
 use super::bsdf::BsdfSample;
 use super::light::{
     LightSample, area_pdf, sample_directional_light, sample_plane_light, sample_point_light, sample_sphere_light,
@@ -15,7 +15,7 @@ use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin,
 use super::sky::{SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
 use crate::pack::layout::{
     LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_TEXTURE_SHIFT,
-    LIGHT_VOLUME, Texture,
+    LIGHT_VOLUME,
 };
 use glam::{DVec2, DVec3};
 

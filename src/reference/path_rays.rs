@@ -3,8 +3,9 @@
 use super::bindings::Tables;
 use super::path_flight::near_distance;
 use super::path_state::{Hit, INFINITE_DISTANCE, NONE, Path, medium_at};
+use super::path_surface::{Place, opacity_at};
 use super::ray::{Ray, TriangleHit, intersect_sphere, intersect_triangle};
-use crate::pack::layout::{PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE};
+use crate::pack::layout::{PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_MASK};
 use glam::{DVec2, DVec3};
 
 /// The length L of a shadow ray in its optical depth σ₀ L + Σ (σ after − σ before) (L − t). Where an infinite ray ends in
@@ -33,6 +34,7 @@ pub fn begin_hit(tables: &Tables, path: &Path) -> Hit {
         tau_rgb: DVec3::ZERO,
         blocked: false,
         medium: path.light_medium,
+        passed: 1.0,
     };
     if path.shadow {
         hit.tau_rgb =
@@ -56,8 +58,18 @@ pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit:
     // twice.
     let begins = t > path.t_min || (t == path.t_min && index > path.last && path.last != NONE);
     if path.shadow {
-        let boundary = primitive.surface & PRIMITIVE_BOUNDARY != 0;
+        let mut boundary = primitive.surface & PRIMITIVE_BOUNDARY != 0;
         let counts = begins && t < path.t_max;
+        // The light itself is not in the way of its light.
+        let mut opaque = counts && !boundary && primitive.light != path.light + 1;
+        let surface = tables.surface_of(primitive);
+        if opaque && surface.flags & SURFACE_MASK != 0 {
+            let place = Place { index, point: path.origin + path.direction * t, barycentric };
+            let opacity = opacity_at(tables, surface, &place);
+            hit.passed *= 1.0 - opacity;
+            opaque = opacity >= 1.0;
+            boundary = true;
+        }
         if counts && boundary {
             let way = (shadow_length(path) - t) * if along_normal { -1.0 } else { 1.0 };
             let surface = tables.surface_of(primitive);
@@ -67,8 +79,7 @@ pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit:
             let (from, to) = if along_normal { (inside, outside) } else { (outside, inside) };
             hit.medium = hit.medium.wrapping_add(to).wrapping_sub(from);
         }
-        // The light itself is not in the way of its light.
-        hit.blocked |= counts && !boundary && primitive.light != path.light + 1;
+        hit.blocked |= opaque;
     } else if begins && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE)) {
         hit.t = t;
         hit.primitive = index;

@@ -64,6 +64,10 @@ pub struct Path {
     pub tau_rgb: DVec3,
     /// The flight's.
     pub channel: u32,
+    /// Probability to pass the masks between the last event and `t_min`.
+    pub passed: f64,
+    /// How many masks the path has passed or met.
+    pub crossings: u32,
     /// Where the far clip plane ends a camera ray.
     pub far_end: f64,
     /// Where the path goes on behind a shadow ray.
@@ -107,6 +111,8 @@ pub struct Hit {
     pub blocked: bool,
     /// Shadow rays: the medium at the end of the ray.
     pub medium: u32,
+    /// Shadow rays: fraction of the light that passes masks.
+    pub passed: f64,
 }
 
 /// The four numbers of a set.
@@ -138,15 +144,16 @@ pub fn flight_end(tables: &Tables, path: &Path) -> f64 {
 pub fn begin_segment(tables: &Tables, path: &mut Path, u: DVec2) {
     path.last = NONE;
     path.shadow = false;
+    path.passed = 1.0;
     path.tau_left = minus_log_1m(u.x);
     path.tau_rgb = DVec3::ZERO;
     path.channel = sample_channel(channel_weights(path.throughput), u.y);
     path.t_max = flight_end(tables, path);
 }
 
-/// Probability that the flight got as far as it did.
+/// Probability that the flight got as far as it did, through media and masks.
 pub fn survival(path: &Path) -> f64 {
-    survival_probability(channel_weights(path.throughput), path.tau_rgb)
+    path.passed * survival_probability(channel_weights(path.throughput), path.tau_rgb)
 }
 
 /// The throughput with the weight of a flight that got as far as it did.

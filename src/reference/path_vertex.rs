@@ -2,7 +2,7 @@
 
 use super::bindings::{Primitive, Surface, Tables};
 use super::bsdf::{BsdfSample, BsdfValue, eval_bsdf, sample_bsdf};
-use super::math::{from_frame, max_component, to_frame};
+use super::math::{from_frame, max_component};
 use super::medium::{medium_code, medium_of_code};
 use super::path_state::{Hit, NONE, Path};
 use super::phase::{PhaseTables, eval_henyey_greenstein, eval_mixture, sample_henyey_greenstein, sample_mixture};
@@ -29,6 +29,25 @@ pub struct Vertex {
     pub surface: Surface,
     /// On a surface: towards where the path comes from, in the local frame.
     pub incident: DVec3,
+    /// On a surface: x of the local frame.
+    pub tangent: DVec3,
+    /// On a surface: the geometric normal, on the side of `axis`.
+    pub normal: DVec3,
+}
+
+/// The components of a direction in the local frame of a surface.
+pub fn to_surface_frame(tangent: DVec3, axis: DVec3, direction: DVec3) -> DVec3 {
+    DVec3::new(tangent.dot(direction), axis.cross(tangent).dot(direction), axis.dot(direction))
+}
+
+/// A direction from its components in that frame.
+pub fn from_surface_frame(tangent: DVec3, axis: DVec3, local: DVec3) -> DVec3 {
+    (tangent * local.x + axis.cross(tangent) * local.y + axis * local.z).normalize()
+}
+
+/// Whether a direction lies on the same side of a surface and of its shading normal, which it must not leak through.
+pub fn sides_agree(vertex: &Vertex, local_z: f64, direction: DVec3) -> bool {
+    (local_z > 0.0) == (vertex.normal.dot(direction) > 0.0)
 }
 
 fn phase_tables(tables: &Tables) -> PhaseTables<'_> {
@@ -45,7 +64,11 @@ pub fn eval_scattering(tables: &Tables, vertex: &Vertex, direction: DVec3) -> Bs
         };
         return BsdfValue { value: vertex.albedo * phase, pdf: phase };
     }
-    eval_bsdf(&vertex.surface, vertex.incident, to_frame(vertex.axis, direction))
+    let local = to_surface_frame(vertex.tangent, vertex.axis, direction);
+    if !sides_agree(vertex, local.z, direction) {
+        return BsdfValue::default();
+    }
+    eval_bsdf(&vertex.surface, &tables.values, vertex.incident, local)
 }
 
 /// A direction found by scattering, in world space.
@@ -62,8 +85,12 @@ pub fn sample_scattering(tables: &Tables, vertex: &Vertex, u: DVec2, lobe: f64) 
         let pdf = eval_scattering(tables, vertex, direction).pdf;
         return BsdfSample { direction, weight: vertex.albedo, pdf, eta: 1.0 };
     }
-    let found = sample_bsdf(&vertex.surface, vertex.incident, u, lobe);
-    BsdfSample { direction: from_frame(vertex.axis, found.direction), ..found }
+    let found = sample_bsdf(&vertex.surface, &tables.values, vertex.incident, u, lobe);
+    let direction = from_surface_frame(vertex.tangent, vertex.axis, found.direction);
+    if !sides_agree(vertex, found.direction.z, direction) {
+        return BsdfSample { direction, weight: DVec3::ZERO, pdf: 0.0, ..found };
+    }
+    BsdfSample { direction, ..found }
 }
 
 /// Where a ray in some direction begins so that it does not meet the surface it leaves.
@@ -76,7 +103,7 @@ pub fn medium_towards(tables: &Tables, vertex: &Vertex, medium: u32, direction: 
     if vertex.in_medium || vertex.surface.flags & SURFACE_ORIENTED == 0 {
         return medium;
     }
-    let outwards = vertex.axis.dot(direction) > 0.0;
+    let outwards = vertex.normal.dot(direction) > 0.0;
     if outwards == (vertex.incident.z > 0.0) || vertex.surface.media == 0 {
         return medium;
     }

@@ -1,8 +1,8 @@
 //! Mirror of `shaders/lib/sky.glsl`: radiance from infinitely far, from an image, and the density with which its directions
 //! are sampled.
 
+use super::bindings::Texture;
 use super::math::arctan2;
-use crate::pack::layout::Texture;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, PI};
 

@@ -1,10 +1,11 @@
 //! Tiny scenes, built in Rust.
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DAffine2, DMat3, DMat4, DVec2, DVec3};
 use std::sync::Arc;
 use tyndall::pack::Packed;
 use tyndall::scene::{
-    Bitmap, Bsdf, Camera, Distribution, Film, Geometry, Light, Medium, Mesh, Phase, Roughness, Scene, Shape,
+    Bitmap, Bsdf, Camera, Distribution, Film, Filter, Geometry, Light, Medium, Mesh, Phase, Roughness, Scene, Shape,
+    Texture, Wrap,
 };
 
 /// The tables of a scene.
@@ -283,6 +284,116 @@ pub fn glow() -> Scene {
     scene
 }
 
+/// A small image of many colours.
+pub fn image() -> Arc<Bitmap> {
+    let channel = |k: usize, step: usize| 0.1 + 0.8 * ((k * step) % 11) as f32 / 10.0;
+    let pixels = (0..20).map(|k| [channel(k, 3), channel(k, 5), channel(k, 7)]).collect();
+    Arc::new(Bitmap::new(5, 4, pixels).expect("it is small"))
+}
+
+/// The image as a texture, scaled.
+pub fn picture(filter: Filter, wrap: Wrap, scale: f64) -> Texture {
+    let to_uv = DAffine2::from_scale_angle_translation(DVec2::splat(scale), 0.3, DVec2::new(0.1, -0.2));
+    Texture::Bitmap { bitmap: image(), filter, wrap, to_uv }
+}
+
+/// Squares, `scale` pairs of them in each direction.
+pub fn squares(color0: DVec3, color1: DVec3, scale: f64) -> Texture {
+    Texture::Checkerboard { color0, color1, to_uv: DAffine2::from_scale(DVec2::splat(scale)) }
+}
+
+/// With the normals of a unit sphere about the origin, and the texture coordinates of Mitsuba's sphere (but for the seam).
+pub fn smooth_ball(level: u32, center: DVec3, radius: f64) -> Geometry {
+    let mut mesh = icosphere(level);
+    mesh.normals = mesh.positions.clone();
+    mesh.uvs = mesh
+        .normals
+        .iter()
+        .map(|d| DVec2::new(d.y.atan2(d.x) / std::f64::consts::TAU, d.z.acos() / std::f64::consts::PI))
+        .collect();
+    mesh.positions.iter_mut().for_each(|position| *position = center + *position * radius);
+    Geometry::Mesh(mesh)
+}
+
+/// A parallelogram with texture coordinates from 0 to 1.
+fn textured_quad(corner: DVec3, edge_1: DVec3, edge_2: DVec3) -> Geometry {
+    let Geometry::Mesh(mut mesh) = quad(corner, edge_1, edge_2) else { unreachable!("a quad is a mesh") };
+    mesh.uvs = vec![DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
+    Geometry::Mesh(mesh)
+}
+
+fn rough(alpha_u: f64, alpha_v: f64, distribution: Distribution) -> Roughness {
+    Roughness { distribution, alpha_u, alpha_v }
+}
+
+/// Textures, smooth shading, rough plastic and masks, one of them on the boundary of a medium.
+pub fn surfaces() -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    walls(&mut scene);
+    scene.shapes.push(lamp());
+    let textured = |texture| Bsdf::Diffuse { reflectance: texture, two_sided: true };
+    let mut floor =
+        Shape::diffuse("tiles", textured_quad(v(-1.0, -0.95, 1.0), DVec3::X * 2.0, DVec3::Z * -2.0), DVec3::ONE);
+    floor.bsdf = textured(squares(v(0.8, 0.7, 0.2), v(0.1, 0.2, 0.3), 3.0));
+    let mut painting =
+        Shape::diffuse("painting", textured_quad(v(-0.8, -0.6, -0.9), DVec3::X, DVec3::Y * 1.2), DVec3::ONE);
+    painting.bsdf = textured(picture(Filter::Bilinear, Wrap::Mirror, 2.0));
+    let mut veil = Shape::diffuse("veil", textured_quad(v(-0.9, -0.2, 0.7), DVec3::X, DVec3::Y), DVec3::ONE);
+    let opacity = squares(DVec3::splat(0.9), DVec3::splat(0.2), 2.0);
+    veil.bsdf = Bsdf::Mask { opacity, nested: Box::new(textured(picture(Filter::Nearest, Wrap::Clamp, 1.3))) };
+    let mut plastic = Shape::diffuse("plastic", smooth_ball(2, v(0.45, -0.5, 0.3), 0.4), DVec3::ONE);
+    plastic.bsdf = Bsdf::RoughPlastic {
+        roughness: rough(0.2, 0.2, Distribution::Ggx),
+        diffuse_reflectance: squares(v(0.7, 0.3, 0.2), v(0.2, 0.3, 0.7), 4.0),
+        specular_reflectance: DVec3::ONE.into(),
+        int_ior: 1.5,
+        ext_ior: 1.0,
+        nonlinear: true,
+        two_sided: false,
+    };
+    let haze = scene.add_medium(gray(3.0, 0.8, 0.3));
+    let mut frosted = Shape::boundary("frosted", ball(v(-0.4, -0.5, 0.0), 0.35), haze);
+    frosted.bsdf = Bsdf::Mask {
+        opacity: squares(DVec3::ZERO, DVec3::splat(0.7), 3.0),
+        nested: Box::new(textured(DVec3::splat(0.6).into())),
+    };
+    let mut ring = Shape::diffuse("ring", ball(v(0.3, 0.4, -0.4), 0.3), DVec3::ONE);
+    ring.bsdf = Bsdf::Mask { opacity: DVec3::splat(0.5).into(), nested: Box::new(textured(DVec3::splat(0.9).into())) };
+    scene.shapes.extend([floor, painting, veil, plastic, frosted, ring]);
+    scene
+}
+
+/// Metal and glass whose roughness has a direction, and smooth shading around a medium.
+pub fn metals() -> Scene {
+    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
+    walls(&mut scene);
+    scene.shapes.push(lamp());
+    scene.lights.push(Light::Constant { radiance: v(0.1, 0.15, 0.2) });
+    let metal = |distribution| Bsdf::RoughConductor {
+        roughness: rough(0.08, 0.35, distribution),
+        eta: v(0.2, 0.92, 1.1),
+        k: v(3.9, 2.45, 2.14),
+        specular_reflectance: picture(Filter::Bilinear, Wrap::Repeat, 2.0),
+        two_sided: true,
+    };
+    let mut pan =
+        Shape::diffuse("pan", textured_quad(v(-0.9, -0.9, 0.8), DVec3::X * 1.8, v(0.0, 0.2, -1.6)), DVec3::ONE);
+    pan.bsdf = metal(Distribution::Ggx);
+    let mut pot = Shape::diffuse("pot", ball(v(-0.45, -0.2, -0.2), 0.4), DVec3::ONE);
+    pot.bsdf = metal(Distribution::Beckmann);
+    let haze = scene.add_medium(gray(2.0, 0.9, 0.4));
+    let mut vase = Shape::boundary("vase", smooth_ball(2, v(0.4, -0.3, 0.3), 0.4), haze);
+    vase.bsdf = Bsdf::RoughDielectric {
+        roughness: rough(0.3, 0.1, Distribution::Ggx),
+        int_ior: 1.5,
+        ext_ior: 1.0,
+        specular_reflectance: DVec3::ONE.into(),
+        specular_transmittance: v(0.9, 1.0, 0.8).into(),
+    };
+    scene.shapes.extend([pan, pot, vase]);
+    scene
+}
+
 /// All scenes of this file, by name.
 pub fn all() -> Vec<(&'static str, Scene)> {
     vec![
@@ -295,6 +406,8 @@ pub fn all() -> Vec<(&'static str, Scene)> {
         ("all lights", all_lights()),
         ("mixed phases", mixed_phases()),
         ("glow", glow()),
+        ("surfaces", surfaces()),
+        ("metals", metals()),
     ]
 }
 

@@ -2,7 +2,10 @@
 
 use super::units::{run, vec4, widen};
 use glam::{DVec3, Vec3};
+use std::sync::OnceLock;
 use tyndall::pack::layout::*;
+use tyndall::pack::material::{COAT_ENTRIES, Coat};
+use tyndall::scene::{Distribution, Roughness};
 
 /// Glass of relative index 1.5 that takes nothing away.
 pub fn glass(alpha: f32, ggx: bool) -> Surface {
@@ -12,6 +15,7 @@ pub fn glass(alpha: f32, ggx: bool) -> Surface {
         transmittance: Vec3::ONE,
         eta: 1.5,
         alpha,
+        alpha_v: alpha,
         ..Surface::default()
     }
 }
@@ -25,6 +29,7 @@ pub fn metal(alpha: f32, ggx: bool) -> Surface {
         extinction: Vec3::new(3.9, 2.45, 2.14),
         eta: 1.0,
         alpha,
+        alpha_v: alpha,
         ..Surface::default()
     }
 }
@@ -37,10 +42,48 @@ pub fn plastic(alpha: f32, ggx: bool) -> Surface {
         specular: Vec3::ONE,
         eta: 1.5,
         alpha,
+        alpha_v: alpha,
         internal_reflectance: 0.5963,
         specular_weight: 0.65,
         ..Surface::default()
     }
+}
+
+/// The same surface with another roughness across the tangent.
+pub fn brushed(surface: Surface, alpha_v: f32) -> Surface {
+    Surface { alpha_v, ..surface }
+}
+
+/// Plastic whose rough varnish lets light through as Mitsuba's does; its table is among the [`values`].
+pub fn rough_plastic(alpha: f32, ggx: bool) -> Surface {
+    let entry = ROUGH.iter().position(|known| *known == (alpha, ggx)).expect("the values have a table for it");
+    let coat = &coats()[entry];
+    Surface {
+        internal_reflectance: coat.internal_reflectance,
+        first_value: (entry * COAT_ENTRIES) as u32,
+        value_count: COAT_ENTRIES as u32,
+        ..plastic(alpha, ggx)
+    }
+}
+
+/// Roughness and kind of the varnishes whose tables are among the [`values`].
+const ROUGH: &[(f32, bool)] = &[(0.1, false), (0.1, true), (0.2, true), (0.5, false), (0.5, true)];
+
+fn coats() -> &'static [Coat] {
+    static COATS: OnceLock<Vec<Coat>> = OnceLock::new();
+    COATS.get_or_init(|| {
+        let coat = |&(alpha, ggx): &(f32, bool)| {
+            let distribution = if ggx { Distribution::Ggx } else { Distribution::Beckmann };
+            let alpha = f64::from(alpha);
+            Coat::new(&Roughness { distribution, alpha_u: alpha, alpha_v: alpha }, 1.5)
+        };
+        ROUGH.iter().map(coat).collect()
+    })
+}
+
+/// The tables that [`rough_plastic`] refers to.
+pub fn values() -> Vec<f32> {
+    coats().iter().flat_map(|coat| coat.transmittance.clone()).collect()
 }
 
 /// What is asked of the kernel.
@@ -70,6 +113,8 @@ pub struct Answer {
     pub facet: [f32; 3],
     pub density: f32,
     pub conductor: [f32; 3],
+    /// Density with which the facet is sampled.
+    pub facet_pdf: f32,
 }
 
 impl Answer {
@@ -99,7 +144,8 @@ pub fn ask(surfaces: &[Surface], queries: &[Query]) -> Vec<Answer> {
         })
         .collect();
     let table = bytemuck::cast_slice(surfaces);
-    let outputs: Vec<[f32; 4]> = run("bsdf", &inputs, &[table], queries.len(), 6 * queries.len());
+    let outputs: Vec<[f32; 4]> =
+        run("bsdf", &inputs, &[table, bytemuck::cast_slice(&values())], queries.len(), 6 * queries.len());
     let three = |vector: [f32; 4]| [vector[0], vector[1], vector[2]];
     let answer = |output: &[[f32; 4]]| Answer {
         direction: three(output[0]),
@@ -114,6 +160,7 @@ pub fn ask(surfaces: &[Surface], queries: &[Query]) -> Vec<Answer> {
         facet: three(output[4]),
         density: output[4][3],
         conductor: three(output[5]),
+        facet_pdf: output[5][3],
     };
     outputs.chunks(6).map(answer).collect()
 }

@@ -41,6 +41,8 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "sample_facet", relative: 4e-6, absolute: 0.0 },
     Tolerance { function: "facet_density", relative: 6e-6, absolute: 2e-38 },
     Tolerance { function: "facet_masking", relative: 4e-6, absolute: 2e-38 },
+    Tolerance { function: "facet_pdf", relative: 1e-5, absolute: 2e-38 },
+    Tolerance { function: "eval_texture", relative: 0.0, absolute: 4e-5 },
     Tolerance { function: "eval_bsdf value", relative: 2e-5, absolute: 1e-15 },
     Tolerance { function: "eval_bsdf pdf", relative: 2e-5, absolute: 1e-15 },
     Tolerance { function: "sample_bsdf direction", relative: 4e-6, absolute: 0.0 },

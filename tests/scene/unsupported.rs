@@ -16,19 +16,20 @@ fn refusal(body: &str) -> Option<String> {
 fn nothing_is_left_out_silently() {
     let shape = |bsdf: &str| format!(r#"<shape type="rectangle" id="thing">{bsdf}</shape>"#);
     let inside = r#"<bsdf type="diffuse"/>"#;
-    for plugin in ["roughplastic", "mask"] {
-        let inside = if plugin == "mask" { inside } else { "" };
-        let text = refusal(&shape(&format!(r#"<bsdf type="{plugin}">{inside}</bsdf>"#)));
-        assert_eq!(text, Some(format!("the {plugin} BSDF of \"thing\" cannot be rendered yet")));
-    }
-    for plugin in ["dielectric", "thindielectric", "roughdielectric", "conductor", "roughconductor", "plastic"] {
+    let masked = format!(r#"<bsdf type="mask">{inside}</bsdf>"#);
+    assert_eq!(refusal(&shape(&masked)), None);
+    let twice = format!(r#"<bsdf type="mask">{masked}</bsdf>"#);
+    assert_eq!(refusal(&shape(&twice)).unwrap(), "the mask inside of a mask of \"thing\" cannot be rendered yet");
+    for plugin in
+        ["roughplastic", "dielectric", "thindielectric", "roughdielectric", "conductor", "roughconductor", "plastic"]
+    {
         assert_eq!(refusal(&shape(&format!(r#"<bsdf type="{plugin}"/>"#))), None);
     }
     let brushed =
         r#"<bsdf type="roughconductor"><float name="alpha_u" value="0.1"/><float name="alpha_v" value="0.2"/></bsdf>"#;
-    assert_eq!(refusal(&shape(brushed)).unwrap(), "the anisotropic roughness of \"thing\" cannot be rendered yet");
+    assert_eq!(refusal(&shape(brushed)), None);
     let checker = r#"<bsdf type="diffuse"><texture type="checkerboard" name="reflectance"/></bsdf>"#;
-    assert_eq!(refusal(&shape(checker)).unwrap(), "the texture of \"thing\" cannot be rendered yet");
+    assert_eq!(refusal(&shape(checker)), None);
     assert_eq!(refusal(&shape(inside)), None);
     let medium = |inside: &str| {
         format!(
@@ -52,14 +53,22 @@ fn nothing_is_left_out_silently() {
 }
 
 #[test]
-fn vertex_normals_are_not_used_yet() {
-    let warnings = |inside: &str| {
+fn vertex_normals_are_used_unless_the_scene_says_otherwise() {
+    let packed = |inside: &str| {
         let body = format!(r#"<shape type="obj"><string name="filename" value="meshes/ball.obj"/>{inside}</shape>"#);
-        Packed::new(&scene(&body), 0).unwrap().warnings
+        Packed::new(&scene(&body), 0).unwrap()
     };
-    let smooth = warnings("");
-    assert!(smooth.len() == 1 && smooth[0].starts_with("flat normals are used for \"meshes/ball.obj\""), "{smooth:?}");
-    assert_eq!(warnings(r#"<boolean name="face_normals" value="true"/>"#), [""; 0]);
-    assert_eq!(warnings(r#"<bsdf type="null"/>"#), [""; 0]);
     assert!(data("meshes/ball.obj").exists());
+    let smooth = packed("");
+    assert!(smooth.features.shading_normals && smooth.warnings.is_empty(), "{:?}", smooth.warnings);
+    // One entry for each primitive, in the order of the tree: every normal belongs to its corner.
+    assert_eq!(smooth.corners.len(), smooth.primitives.len());
+    for (corners, primitive) in smooth.corners.iter().zip(&smooth.primitives) {
+        let flat = (primitive.b - primitive.a).cross(primitive.c - primitive.a);
+        assert!(corners.normal_a.dot(flat) > 0.0 && corners.normal_b.dot(flat) > 0.0, "{corners:?}");
+    }
+    for inside in [r#"<boolean name="face_normals" value="true"/>"#, r#"<bsdf type="null"/>"#] {
+        let flat = packed(inside);
+        assert!(!flat.features.shading_normals && flat.corners.is_empty(), "{inside}");
+    }
 }

@@ -1,0 +1,52 @@
+//! Mirror of `shaders/lib/texture.glsl`: colours that depend on the place on a surface.
+
+use super::bindings::Texture;
+use crate::pack::layout::{TEXTURE_CHECKERBOARD, TEXTURE_CLAMP, TEXTURE_MIRROR, TEXTURE_NEAREST};
+use glam::{DVec2, DVec3};
+
+/// A coordinate moved to \[−1/2, 5/2\] without moving to another pixel.
+pub fn wrapped_coordinate(x: f64, flags: u32) -> f64 {
+    if flags & TEXTURE_CLAMP != 0 {
+        return x.clamp(-0.5, 1.5);
+    }
+    if flags & TEXTURE_MIRROR != 0 { x - 2.0 * (0.5 * x).floor() } else { x - x.floor() }
+}
+
+/// The pixel of an index that may lie outside of the image by as much as [`wrapped_coordinate`] leaves.
+pub fn wrapped_index(mut index: i32, size: u32, flags: u32) -> u32 {
+    let count = size as i32;
+    if flags & TEXTURE_CLAMP != 0 {
+        return index.clamp(0, count - 1) as u32;
+    }
+    let period = if flags & TEXTURE_MIRROR != 0 { 2 * count } else { count };
+    index = if index < 0 { index + period } else { index };
+    index = if index >= period { index - period } else { index };
+    (if index < count { index } else { period - 1 - index }) as u32
+}
+
+fn texture_pixel(texture: &Texture, values: &[f32], x: i32, y: i32) -> DVec3 {
+    let column = wrapped_index(x, texture.width, texture.flags);
+    let row = wrapped_index(y, texture.height, texture.flags);
+    let first = (texture.first_value + 3 * (row * texture.width + column)) as usize;
+    DVec3::new(f64::from(values[first]), f64::from(values[first + 1]), f64::from(values[first + 2]))
+}
+
+/// The colour at texture coordinates; `values` holds the pixels.
+pub fn eval_texture(texture: &Texture, values: &[f32], uv: DVec2) -> DVec3 {
+    let place = DVec2::new(texture.row_u.dot(uv.extend(1.0)), texture.row_v.dot(uv.extend(1.0)));
+    if texture.kind == TEXTURE_CHECKERBOARD {
+        let above = (place - place.floor()).cmpgt(DVec2::splat(0.5));
+        return if above.x == above.y { texture.color_0 } else { texture.color_1 };
+    }
+    let place = DVec2::new(wrapped_coordinate(place.x, texture.flags), wrapped_coordinate(place.y, texture.flags));
+    let place = place * DVec2::new(f64::from(texture.width), f64::from(texture.height));
+    if texture.flags & TEXTURE_NEAREST != 0 {
+        return texture_pixel(texture, values, place.x.floor() as i32, place.y.floor() as i32);
+    }
+    let low = (place - 0.5).floor();
+    let share = place - 0.5 - low;
+    let (x, y) = (low.x as i32, low.y as i32);
+    let upper = texture_pixel(texture, values, x, y).lerp(texture_pixel(texture, values, x + 1, y), share.x);
+    let lower = texture_pixel(texture, values, x, y + 1).lerp(texture_pixel(texture, values, x + 1, y + 1), share.x);
+    upper.lerp(lower, share.y)
+}
