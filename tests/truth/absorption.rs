@@ -113,6 +113,7 @@ fn absorption_along_camera_rays() {
                     expected,
                     error: error.min(1e-6 * expected),
                     tolerance: 5e-3 * expected,
+                    heavy_tailed: false,
                 });
             }
         }

@@ -41,7 +41,8 @@ fn cases(row: &Row) -> Vec<Case> {
     let (absorbed, error) = row.value("absorbed_fraction");
     let views = gauss(8).into_iter().map(|(mu, weight)| (2.0 * mu * weight, chord(row, (1.0 - mu * mu).sqrt())));
     let (expected, name) = (1.0 - absorbed, format!("{} 1 - absorbed_fraction", row.id));
-    cases.push(Case { name, views: views.collect(), channel: 0, expected, error, tolerance: tolerance(row, expected) });
+    let tolerance = tolerance(row, expected);
+    cases.push(Case { name, views: views.collect(), channel: 0, expected, error, tolerance, heavy_tailed: false });
     cases
 }
 
