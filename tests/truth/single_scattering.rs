@@ -1,10 +1,10 @@
-//! Exactly one scattering event (table E): a point light and a square lamp in an unbounded medium, and a beam.
+//! Exactly one scattering event (table E): a point light and a square lamp in an unbounded medium.
 
 use crate::CASES;
 use crate::common::scenes::{self, quad};
 use crate::common::trial::{Case, judge, must_reject};
 use crate::common::truth::{Row, full, rows};
-use glam::{DMat4, DVec3};
+use glam::DVec3;
 use tyndall::scene::{Light, Medium, Scene, Shape};
 
 fn medium(row: &Row, g: f64) -> Medium {
@@ -26,10 +26,6 @@ fn scene(row: &Row, g: f64) -> Scene {
     scene.camera.near_clip = 1e-6;
     scene.integrator.max_depth = Some(2);
     let id = scene.add_medium(medium(row, g));
-    if row.word("light") == "collimated_beam" {
-        beam(row, &mut scene, id);
-        return scene;
-    }
     scene.camera.medium = Some(id);
     // Without a wall, one so far away that nothing comes from behind it. It is so small that it shadows nothing.
     let distance = row.maybe_number("tmax").unwrap_or(40.0 / (row.number("sigma_s") + row.number("sigma_a")));
@@ -44,22 +40,6 @@ fn scene(row: &Row, g: f64) -> Scene {
         scene.shapes.push(Shape::lamp("lamp", lamp, DVec3::splat(row.number("Le"))));
     }
     scene
-}
-
-/// Parallel light that comes through a hole in a black screen, just outside of the medium beyond x = 0.
-fn beam(row: &Row, scene: &mut Scene, medium: tyndall::scene::MediumId) {
-    let half = 40.0;
-    let place = DMat4::from_translation(DVec3::X * half) * DMat4::from_scale(DVec3::splat(half));
-    scene.shapes.push(Shape::boundary("half space", scenes::cuboid(place), medium));
-    let (z, y, x, edge) = (row.list("beam_z"), [-0.5, 0.5], -1e-3, 1.1 * half);
-    for [y0, y1, z0, z1] in
-        [[-edge, y[0], -edge, edge], [y[1], edge, -edge, edge], [y[0], y[1], -edge, z[0]], [y[0], y[1], z[1], edge]]
-    {
-        let part = quad(DVec3::new(x, y0, z0), DVec3::Y * (y1 - y0), DVec3::Z * (z1 - z0));
-        scene.shapes.push(Shape::diffuse("screen", part, DVec3::ZERO));
-    }
-    let irradiance = DVec3::splat(row.number("E0_perp"));
-    scene.lights.push(Light::Directional { direction: row.vector("beam_dir"), irradiance });
 }
 
 fn case(row: &Row, g: f64) -> Case {
