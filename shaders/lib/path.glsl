@@ -18,7 +18,9 @@
 #include "lib/path_flight.glsl"
 #include "lib/camera.glsl"
 
-// Depth at which roulette begins to end paths that lose nothing, so that a closed scene without absorption ends.
+// Depth at which roulette begins to end paths that lose nothing, so that a closed scene without absorption ends. A path gets
+// to depth d with a probability near (RELENTLESS_DEPTH / d)²: slowly enough for dense media that absorb nothing, in which the number
+// of events has a long tail; a constant probability would give the longest paths weights beyond all bounds.
 const uint RELENTLESS_DEPTH = 256u;
 
 // The sets of random numbers by which light meets masks or passes them begin here, beyond those of any segment.
@@ -80,7 +82,7 @@ void next_segment(inout Path path) {
     path.segment += 1u;
     vec4 u = sample_set(path, 2u * path.segment);
     if (path.depth >= RR_DEPTH) {
-        float most = path.depth < RELENTLESS_DEPTH ? 1.0 : 0.95;
+        float most = path.depth < RELENTLESS_DEPTH ? 1.0 : 1.0 - 2.0 / float(path.depth);
         float keep = min(3.0 * max_component(path.throughput) * (HAS_DIELECTRIC ? path.eta_scale : 1.0), most);
         path.alive = path.alive && u.x < keep;
         path.throughput /= keep;

@@ -28,7 +28,9 @@ impl Nesting {
     /// Finds all of it.
     pub fn of(scene: &Scene) -> Nesting {
         let enclosures: Vec<Enclosure> = scene.shapes.iter().enumerate().filter_map(Enclosure::of).collect();
-        let eye = scene.camera.to_world.w_axis.truncate();
+        // Rays begin on the near plane, and so does the medium.
+        let forward = scene.camera.to_world.z_axis.truncate().normalize();
+        let eye = scene.camera.to_world.w_axis.truncate() + forward * scene.camera.near_clip;
         let mut warnings = Vec::new();
 
         let around_camera = innermost(&enclosures, eye, |_| true);

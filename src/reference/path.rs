@@ -84,7 +84,7 @@ fn next_segment(tables: &Tables, path: &mut Path) {
     path.segment += 1;
     let u = sample_set(tables, path, 2 * path.segment);
     if path.depth >= tables.features.rr_depth {
-        let most = if path.depth < RELENTLESS_DEPTH { 1.0 } else { 0.95 };
+        let most = if path.depth < RELENTLESS_DEPTH { 1.0 } else { 1.0 - 2.0 / f64::from(path.depth) };
         let keep = (3.0 * max_component(path.throughput) * path.eta_scale).min(most);
         path.alive = path.alive && u.x < keep;
         path.throughput /= keep;

@@ -10,6 +10,7 @@ pub mod scenes;
 pub mod statistics;
 pub mod surfaces;
 pub mod tolerances;
+pub mod trial;
 pub mod truth;
 pub mod units;
 

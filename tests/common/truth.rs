@@ -9,6 +9,23 @@ pub struct Row {
     value: Value,
 }
 
+/// Whether all rows are tested, with as many samples as it takes, or the core rows with fewer.
+pub fn full() -> bool {
+    std::env::var_os("TYNDALL_FULL").is_some_and(|value| !value.is_empty())
+}
+
+/// The rows of a table that this run tests.
+pub fn rows(name: &str) -> Vec<Row> {
+    table(name).into_iter().filter(|row| full() || row.core()).collect()
+}
+
+/// The bias worth catching: relative to what is expected, but no less than an absolute one. Half a per cent and 5e-4 for the
+/// core rows of a full run, twice that for all others.
+pub fn tolerance(row: &Row, expected: f64) -> f64 {
+    let unit = if full() && row.core() { 5e-4 } else { 1e-3 };
+    (10.0 * unit * expected).max(unit)
+}
+
 /// The rows of `tests/truth/{name}.json`.
 pub fn table(name: &str) -> Vec<Row> {
     let path = format!("{}/tests/truth/{name}.json", env!("CARGO_MANIFEST_DIR"));
@@ -24,6 +41,42 @@ impl Row {
     /// A number of the input.
     pub fn number(&self, name: &str) -> f64 {
         self.value["in"][name].as_f64().unwrap_or_else(|| panic!("{}: no {name}", self.id))
+    }
+
+    /// A number of the input, or nothing where it is another kind of value.
+    pub fn maybe_number(&self, name: &str) -> Option<f64> {
+        self.value["in"][name].as_f64()
+    }
+
+    /// A word of the input; empty where there is none.
+    pub fn word(&self, name: &str) -> &str {
+        self.value["in"][name].as_str().unwrap_or_default()
+    }
+
+    /// Three numbers of the input.
+    pub fn vector(&self, name: &str) -> glam::DVec3 {
+        glam::DVec3::from_slice(&self.list(name))
+    }
+
+    /// The input as it is.
+    pub fn input(&self) -> &Value {
+        &self.value["in"]
+    }
+
+    /// Whether the row belongs to the few of every check.
+    pub fn core(&self) -> bool {
+        self.value["tier"] == "core"
+    }
+
+    /// Whether there is such an output.
+    pub fn has(&self, name: &str) -> bool {
+        !self.value["out"][name].is_null()
+    }
+
+    /// A single value of the output and its absolute error.
+    pub fn value(&self, name: &str) -> (f64, f64) {
+        let (values, error) = self.output(name);
+        (values[0], error)
     }
 
     /// A list of the input.
