@@ -8,6 +8,8 @@ mod bad_input;
 mod bad_materials;
 #[path = "scene/check.rs"]
 mod check;
+#[path = "scene/crossings.rs"]
+mod crossings;
 #[path = "scene/docs.rs"]
 mod docs;
 #[path = "scene/features.rs"]
