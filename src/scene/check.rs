@@ -31,12 +31,18 @@ pub fn doubts(scene: &Scene) -> Vec<String> {
 }
 
 /// For each shape that is a boundary: the smallest boundary around it, by geometry, as an index into [`Scene::shapes`]; asked
-/// just outside of its first triangle. `None` for the others, and for those that nothing encloses.
+/// just outside of its first triangle. `None` for the others, and for those that nothing encloses. A parent has the larger
+/// bounds, so even where boundaries overlap this is a tree.
 pub fn parents(scene: &Scene) -> Vec<Option<usize>> {
     let mut enclosing = Enclosing::default();
     let parent = |(index, shape): (usize, &Shape)| {
         shape.boundary?;
-        enclosing.innermost(scene, *probes(&shape.geometry).first()?, Some(index))
+        let around = enclosing.innermost(scene, *probes(&shape.geometry).first()?, Some(index))?;
+        let [own, parents] = [index, around].map(|index| {
+            let (low, high) = bounds(&scene.shapes[index].geometry);
+            ((high - low).element_product(), index)
+        });
+        (own < parents).then_some(around)
     };
     scene.shapes.iter().enumerate().map(parent).collect()
 }

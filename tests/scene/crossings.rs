@@ -6,7 +6,8 @@ use tyndall::scene::*;
 
 /// A scene in which each of the meshes and spheres is filled with a medium.
 fn filled(geometries: impl IntoIterator<Item = Geometry>) -> Scene {
-    let mut scene = Scene::new(Camera::look_at(DVec3::new(0.0, 0.0, 99.0), DVec3::ZERO, DVec3::Y, 40.0), Film::new(4, 4));
+    let mut scene =
+        Scene::new(Camera::look_at(DVec3::new(0.0, 0.0, 99.0), DVec3::ZERO, DVec3::Y, 40.0), Film::new(4, 4));
     let fog = scene.add_medium(Medium::new("fog", DVec3::ONE, DVec3::ZERO, Phase::Isotropic));
     for (index, geometry) in geometries.into_iter().enumerate() {
         scene.shapes.push(Shape::boundary(&format!("shape {index}"), geometry, fog));
@@ -151,7 +152,10 @@ fn a_mesh_that_crosses_itself() {
         filled([Geometry::Mesh(a)])
     };
     let found = doubts(&merged(0.2));
-    assert!(found.len() == 1 && found[0].contains("\"shape 0\" is the boundary of a medium but crosses itself"), "{found:?}");
+    assert!(
+        found.len() == 1 && found[0].contains("\"shape 0\" is the boundary of a medium but crosses itself"),
+        "{found:?}"
+    );
     assert_eq!(doubts(&merged(1.0)), [""; 0], "touching");
     assert_eq!(doubts(&merged(2.0)), [""; 0], "apart");
     // What is no boundary may do as it likes.
@@ -175,7 +179,8 @@ fn many_triangles_take_no_time() {
 
 #[test]
 fn the_tree_of_boundaries() {
-    let mut scene = filled([block([-9.0; 3], [9.0; 3]), ball([0.0; 3], 3.0), block(UNIT.0, UNIT.1), ball([20.0; 3], 1.0)]);
+    let mut scene =
+        filled([block([-9.0; 3], [9.0; 3]), ball([0.0; 3], 3.0), block(UNIT.0, UNIT.1), ball([20.0; 3], 1.0)]);
     scene.shapes.push(Shape::diffuse("wall", Geometry::Mesh(mesh::rectangle()), DVec3::ONE));
     assert_eq!(parents(&scene), [None, Some(0), Some(1), None, None]);
     assert_eq!(around_camera(&scene), None);

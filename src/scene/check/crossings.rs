@@ -56,7 +56,7 @@ pub(super) fn doubts(scene: &Scene) -> Vec<String> {
     let mut doubts = Vec::new();
     for body in &bodies {
         if let Surface::Mesh(triangles) = &body.surface
-            && let Some(place) = crosses_itself(triangles)
+            && let Some(place) = crosses_itself(triangles).map(rounded)
         {
             doubts.push(format!("\"{}\" is the boundary of a medium but crosses itself, near {place}", body.name));
         }
@@ -71,13 +71,19 @@ pub(super) fn doubts(scene: &Scene) -> Vec<String> {
     }
     pairs.sort_unstable();
     doubts.extend(pairs.into_iter().filter_map(|(a, b)| {
-        let place = cross(&bodies[a], &bodies[b])?;
+        let place = rounded(cross(&bodies[a], &bodies[b])?);
         Some(format!(
             "the boundaries \"{}\" and \"{}\" cross each other, near {place}: where they overlap no medium is defined",
             bodies[a].name, bodies[b].name
         ))
     }));
     doubts
+}
+
+/// A place with as many digits as people need.
+fn rounded(place: DVec3) -> DVec3 {
+    let digits = |value: f64| format!("{value:.5e}").parse().unwrap_or(value);
+    DVec3::new(digits(place.x), digits(place.y), digits(place.z))
 }
 
 fn tolerance(a: &Bounds, b: &Bounds) -> f64 {
@@ -96,7 +102,9 @@ fn cross(a: &Body, b: &Body) -> Option<DVec3> {
             crossing.then(|| *p + (*q - *p) / distance * (distance - s).max(-*r).min(*r))
         }
         (Surface::Sphere { center, radius }, Surface::Mesh(mesh))
-        | (Surface::Mesh(mesh), Surface::Sphere { center, radius }) => sphere_crosses(mesh, *center, *radius, tolerance),
+        | (Surface::Mesh(mesh), Surface::Sphere { center, radius }) => {
+            sphere_crosses(mesh, *center, *radius, tolerance)
+        }
         (Surface::Mesh(a), Surface::Mesh(b)) => {
             // The smaller one asks, the larger one answers.
             let (few, many) = if a.corners.len() <= b.corners.len() { (a, b) } else { (b, a) };
@@ -115,9 +123,10 @@ fn sphere_crosses(mesh: &Triangles, center: DVec3, radius: f64, tolerance: f64) 
         if let Some(&far) = outside
             && close.distance(center) < radius - tolerance
         {
-            // Where the way from the nearest to a far point leaves the sphere, up to the linear interpolation of distances.
-            let (inner, outer) = (close.distance(center), far.distance(center));
-            found = Some(close.lerp(far, (radius - inner) / (outer - inner)));
+            // Where the way from the nearest to the far point leaves the sphere.
+            let (start, way) = (close - center, far - close);
+            let (a, half_b, c) = (way.length_squared(), start.dot(way), start.length_squared() - radius * radius);
+            found = Some(close + way * ((half_b * half_b - a * c).max(0.0).sqrt() - half_b) / a);
         }
         found.is_some()
     });
