@@ -24,6 +24,8 @@ mod mesh;
 mod robustness;
 #[path = "scene/sensor.rs"]
 mod sensor;
+#[path = "scene/shapes.rs"]
+mod shapes;
 #[path = "scene/textures.rs"]
 mod textures;
 #[path = "scene/unsupported.rs"]

@@ -199,8 +199,8 @@ fn transforms() {
 fn shapes() {
     table(&[
         (
-            "‸<shape type=\"disk\"/>",
-            &["<shape type=\"disk\"> is not supported", "accepted types: obj, rectangle, cube, sphere"],
+            "‸<shape type=\"heightfield\"/>",
+            &["<shape type=\"heightfield\"> is not supported", "accepted types: obj, ply, serialized, rectangle, cube, sphere, disk"],
         ),
         ("‸<shape type=\"spheer\"/>", &["did you mean \"sphere\"?"]),
         (

@@ -39,6 +39,9 @@ fn every_property_is_documented() {
     let sampler =
         r#"<sensor type="perspective"><float name="fov" value="1"/><sampler type="ldsampler">‸</sampler></sensor>"#;
     let ball = r#"<shape type="obj"><string name="filename" value="meshes/ball.obj"/>‸</shape>"#;
+    let ply = r#"<shape type="ply"><string name="filename" value="meshes/triangle.ply"/>‸</shape>"#;
+    let serialized = r#"<shape type="serialized"><string name="filename" value="meshes/triangle.serialized"/>‸</shape>"#;
+    let instance = r#"<shape type="shapegroup" id="group"/><shape type="instance"><ref id="group"/>‸</shape>"#;
     let blend = format!(
         r#"<phase type="blendphase"><float name="weight" value="0"/>{0}{0}‸</phase>"#,
         r#"<phase type="isotropic"/>"#
@@ -63,6 +66,11 @@ fn every_property_is_documented() {
             &[],
         ),
         ("### `<shape type=\"obj\">`", ball, shape),
+        ("### `<shape type=\"ply\">`", ply, shape),
+        ("### `<shape type=\"serialized\">`", serialized, shape),
+        ("### `<shape type=\"disk\">`", r#"<shape type="disk">‸</shape>"#, shape),
+        ("### `<shape type=\"cylinder\">`", r#"<shape type="cylinder">‸</shape>"#, shape),
+        ("### `<shape type=\"instance\">`", instance, &[]),
         ("### `<shape type=\"rectangle\">`", r#"<shape type="rectangle">‸</shape>"#, shape),
         ("### `<shape type=\"cube\">`", r#"<shape type="cube">‸</shape>"#, shape),
         ("### `<shape type=\"sphere\">`", r#"<shape type="sphere">‸</shape>"#, shape),

@@ -16,6 +16,7 @@ mod film;
 mod integrator;
 mod material;
 mod medium;
+mod mesh_file;
 mod params;
 mod props;
 mod sensor;

@@ -121,6 +121,11 @@ impl<'a> Props<'a> {
         })
     }
 
+    /// A whole number that only some plugins have.
+    pub fn integer_if(&self, name: &'static str, has: bool) -> Result<Option<Given<'a, i64>>, SceneError> {
+        if has { self.integer(name) } else { Ok(None) }
+    }
+
     /// A truth value.
     pub fn boolean(&self, name: &'static str) -> Result<Option<Given<'a, bool>>, SceneError> {
         self.typed(name, "<boolean>", |value| match *value {
