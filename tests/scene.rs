@@ -26,6 +26,8 @@ mod robustness;
 mod sensor;
 #[path = "scene/shapes.rs"]
 mod shapes;
+#[path = "scene/spectra.rs"]
+mod spectra;
 #[path = "scene/textures.rs"]
 mod textures;
 #[path = "scene/unsupported.rs"]

@@ -40,7 +40,8 @@ fn every_property_is_documented() {
         r#"<sensor type="perspective"><float name="fov" value="1"/><sampler type="ldsampler">‸</sampler></sensor>"#;
     let ball = r#"<shape type="obj"><string name="filename" value="meshes/ball.obj"/>‸</shape>"#;
     let ply = r#"<shape type="ply"><string name="filename" value="meshes/triangle.ply"/>‸</shape>"#;
-    let serialized = r#"<shape type="serialized"><string name="filename" value="meshes/triangle.serialized"/>‸</shape>"#;
+    let serialized =
+        r#"<shape type="serialized"><string name="filename" value="meshes/triangle.serialized"/>‸</shape>"#;
     let instance = r#"<shape type="shapegroup" id="group"/><shape type="instance"><ref id="group"/>‸</shape>"#;
     let blend = format!(
         r#"<phase type="blendphase"><float name="weight" value="0"/>{0}{0}‸</phase>"#,

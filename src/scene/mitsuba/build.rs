@@ -97,6 +97,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
         lights,
         sample_count: sensor.sample_count,
     };
+    context.warnings.extend(tree.warnings());
     // A shape in a group is read for each instance, and warned about each time.
     let mut said = HashSet::new();
     context.warnings.retain(|warning| said.insert(warning.clone()));

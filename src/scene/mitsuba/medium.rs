@@ -16,7 +16,7 @@ pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Med
         return Err(unknown_plugin(child.object, &TYPES));
     }
     let props = context.props(child);
-    let (sigma_t, albedo) = (props.color("sigma_t")?, props.color("albedo")?);
+    let (sigma_t, albedo) = (props.color("sigma_t")?, props.fraction("albedo")?);
     let (sigma_s, sigma_a) = (props.color("sigma_s")?, props.color("sigma_a")?);
     let (scale, emission) = (props.float("scale")?, props.emission("emission")?);
     // Choices of Mitsuba's estimators; the medium is the same.

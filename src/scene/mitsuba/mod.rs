@@ -22,6 +22,7 @@ mod props;
 mod sensor;
 mod shape;
 mod source;
+mod spectrum;
 mod suggest;
 mod texture;
 mod transform;

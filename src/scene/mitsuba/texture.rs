@@ -97,7 +97,7 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
         }
         "checkerboard" => {
             let color = |name, default| {
-                Ok::<DVec3, SceneError>(props.color(name)?.map_or(DVec3::splat(default), |given| given.value))
+                Ok::<DVec3, SceneError>(props.fraction(name)?.map_or(DVec3::splat(default), |given| given.value))
             };
             let (color0, color1) = (color("color0", 0.4)?, color("color1", 0.2)?);
             let to_uv = to_uv(&props)?;
