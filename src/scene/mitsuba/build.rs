@@ -62,7 +62,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
 
     let integrator_child = props.child(Kind::Integrator)?;
     let integrator = match integrator_child {
-        Some(child) => integrator::convert(&context, child)?,
+        Some(child) => integrator::convert(&mut context, child)?,
         None => Integrator::default(),
     };
 

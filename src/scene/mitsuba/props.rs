@@ -5,6 +5,7 @@ use std::cell::{Cell, RefCell};
 
 use glam::{DMat4, DVec3};
 
+use super::plugins;
 use super::spectrum::{self, Color, Meaning};
 use super::suggest::{did_you_mean, list};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
@@ -252,12 +253,13 @@ impl<'a> Props<'a> {
     }
 }
 
-/// The error about a plugin that is not supported.
+/// The error about a plugin that is not supported, with what to use instead if it is one of Mitsuba.
 pub(super) fn unknown_plugin(object: &Object, accepted: &[&str]) -> SceneError {
+    let instead = plugins::instead(object);
+    let hint = if instead.is_empty() { did_you_mean(&object.plugin, accepted.iter().copied()) } else { instead };
     object.at.error(format!(
-        "{} is not supported{}; accepted types: {}",
+        "{} is not supported{hint}; accepted types: {}",
         object.describe(),
-        did_you_mean(&object.plugin, accepted.iter().copied()),
         list(accepted.iter().copied())
     ))
 }

@@ -10,7 +10,7 @@ use super::source;
 use crate::scene::error::Location;
 use crate::scene::{Bitmap, Filter, SceneError, Texture, Wrap, bitmap};
 
-const TYPES: [&str; 2] = ["bitmap", "checkerboard"];
+pub(super) const TYPES: [&str; 2] = ["bitmap", "checkerboard"];
 
 /// A reflectance or another factor that must lie in \[0, 1\], constant or textured.
 pub(super) fn fraction<'a>(
