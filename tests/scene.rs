@@ -8,6 +8,8 @@ mod bad_input;
 mod bad_materials;
 #[path = "scene/check.rs"]
 mod check;
+#[path = "scene/crossings.rs"]
+mod crossings;
 #[path = "scene/docs.rs"]
 mod docs;
 #[path = "scene/features.rs"]
@@ -22,6 +24,10 @@ mod mesh;
 mod robustness;
 #[path = "scene/sensor.rs"]
 mod sensor;
+#[path = "scene/shapes.rs"]
+mod shapes;
+#[path = "scene/spectra.rs"]
+mod spectra;
 #[path = "scene/textures.rs"]
 mod textures;
 #[path = "scene/unsupported.rs"]

@@ -43,6 +43,7 @@ void path_start(inout Path path) {
     path.pdf = 0.0;
     path.alive = true;
     path.eta_scale = 1.0;
+    path.left = NONE;
     path.crossings = 0u;
     path.medium = params.camera_medium;
     begin_segment(path, u.zw);
@@ -135,6 +136,7 @@ void path_advance(inout Path path, Hit hit) {
     if (end.scatters) {
         path.offset = 0.0;
         path.normal = path.direction;
+        path.left = NONE;
         Surface none;
         vec3 point = flight_point(path, hit, end.way);
         scatter(path, Vertex(point, path.direction, true, medium.g, medium.phase, end.weight, none, vec3(0.0), vec3(0.0), vec3(0.0)));
@@ -195,6 +197,7 @@ void path_advance(inout Path path, Hit hit) {
         }
         path.offset = offset_distance(largest);
         path.normal = normal;
+        path.left = is_sphere(primitive) ? NONE : hit.primitive;
         vec3 incident = to_surface_frame(tangent, axis, -path.direction);
         Vertex vertex = Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, incident, tangent, normal);
         if (!sides_agree(vertex, incident.z, -path.direction)) {

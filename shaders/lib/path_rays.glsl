@@ -34,6 +34,8 @@ Hit begin_hit(Path path) {
 void record(Path path, uint index, Primitive primitive, float t, bool along_normal, vec2 barycentric, inout Hit hit) {
     // Distances first, the primitive's index among equals: surfaces that coincide are met one after the other, none twice.
     bool begins = t > path.t_min || (t == path.t_min && index > path.last && path.last != NONE);
+    // On a long, thin triangle rounding may find a distance above 0 for the triangle itself.
+    begins = begins && index != path.left;
     if (HAS_LIGHT_SAMPLING && path.shadow) {
         bool boundary = HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u;
         bool counts = begins && t < path.t_max;

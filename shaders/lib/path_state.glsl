@@ -50,6 +50,7 @@ struct Path {
     vec3 point;
     float offset;           // of rays that leave a surface, along its normal; 0 in a medium
     vec3 normal;            // only valid when offset > 0
+    uint left;              // the triangle on which the vertex lies, which its rays cannot meet again; else NONE
     uint next_medium;       // where dielectrics are: the medium of the next segment
     float eta_scale;        // where dielectrics are: the product of squared indices that refraction divided radiance by
 };

@@ -23,7 +23,7 @@ pub struct Cli {
 const EXIT_CODES: &str = "\
 Exit codes:
   0   done
-  1   the render failed, or samples were not finite
+  1   the render failed, or samples were not finite; or `check --strict` has something to say
   2   the arguments or the scene are wrong
   69  no usable device
   74  a file cannot be read or written
@@ -38,6 +38,8 @@ pub enum Command {
     Devices,
     /// Measure how far an image is from a reference
     Compare(CompareArgs),
+    /// Tell what is in a scene, and what is doubtful about it
+    Check(CheckArgs),
 }
 
 /// Arguments of `tyndall render`.
@@ -88,6 +90,24 @@ pub struct CompareArgs {
     /// What it should be
     #[arg(value_name = "REF.exr")]
     pub reference: PathBuf,
+}
+
+/// Arguments of `tyndall check`.
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_CODES)]
+pub struct CheckArgs {
+    /// Scene in Mitsuba 3's XML format
+    #[arg(value_name = "SCENE.xml")]
+    pub scene: PathBuf,
+    /// Set a parameter ($name) of the scene; may be repeated
+    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_override)]
+    pub overrides: Vec<(String, String)>,
+    /// Print JSON, for programs
+    #[arg(long)]
+    pub json: bool,
+    /// End with exit code 1 if there are warnings or doubts
+    #[arg(long)]
+    pub strict: bool,
 }
 
 impl RenderArgs {

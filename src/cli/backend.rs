@@ -33,6 +33,16 @@ pub fn open(choice: &str, scene: &Scene, seed: u32, warn: &mut dyn FnMut(&str)) 
     Ok(Box::new(gpu::Renderer::new(&device, &packed).map_err(device_error)?))
 }
 
+/// The tables of a scene, as [`open`] would upload them.
+pub fn pack(scene: &Scene) -> Result<Packed, CliError> {
+    Packed::new(scene, 0).map_err(|error| CliError::Scene(error.to_string()))
+}
+
+/// Bytes on the device and on the host that rendering takes beside the tables.
+pub fn working_memory(crop: [u32; 2]) -> (u64, u64) {
+    gpu::Renderer::working_memory(crop)
+}
+
 /// The Vulkan devices, in the order of their numbers. An empty list is not an error.
 pub fn list() -> Result<Vec<DeviceDescription>, CliError> {
     gpu::devices().map_err(device_error)

@@ -1,6 +1,6 @@
 //! The command line: one module for each command, and what they share.
 //!
-//! Standard output carries results only (the table of `compare`, the list of `devices`); progress, warnings and errors go
+//! Standard output carries results only (the table of `compare`, the list of `devices`, the report of `check`); progress, warnings and errors go
 //! to standard error. Errors are printed in one place, in `main`.
 
 use std::fmt::Arguments;
@@ -11,12 +11,14 @@ use clap::Parser;
 
 mod args;
 mod backend;
+mod check;
 mod compare;
 mod devices;
 mod error;
 mod interrupt;
 mod progress;
 mod render;
+mod report;
 
 use args::{Cli, Command};
 pub use error::CliError;
@@ -29,6 +31,7 @@ pub fn run() -> Result<ExitCode, CliError> {
         Command::Render(args) => render::run(&args),
         Command::Devices => devices::run(),
         Command::Compare(args) => compare::run(&args),
+        Command::Check(args) => check::run(&args),
     }
 }
 

@@ -16,7 +16,7 @@ use super::{backend, interrupt};
 
 /// Renders the scene and writes the image:
 /// 1. find out whether the image could be written;
-/// 2. read the scene, and change it as the arguments say;
+/// 2. read the scene, change it as the arguments say, and tell whether it is doubtful;
 /// 3. open the device and render until done, out of time or interrupted;
 /// 4. write the image, and the preview;
 /// 5. tell how it went.
@@ -33,6 +33,10 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
     loaded.warnings.iter().for_each(|warning| warn(warning));
     let mut scene = loaded.scene;
     let spp = args.apply(&mut scene)?;
+
+    if !args.quiet {
+        doubts(args, &scene);
+    }
 
     let mut backend = backend::open(&args.device, &scene, args.seed, &mut warn)?;
     // From here on a signal leads to an image. Before, it simply ends the program.
@@ -86,6 +90,16 @@ fn render(
         Outcome::Finished | Outcome::TimeLimit => ExitCode::SUCCESS,
         Outcome::Interrupted => ExitCode::from(STOPPED_EARLY),
     })
+}
+
+/// Says that there are doubts about the scene, and where to read them.
+fn doubts(args: &RenderArgs, scene: &Scene) {
+    let count = tyndall::scene::check::doubts(scene).len();
+    let plural = if count == 1 { "" } else { "s" };
+    if count > 0 {
+        let path = args.scene.display();
+        super::say(format_args!("warning: {count} doubt{plural} about the scene; `tyndall check {path}` lists them"));
+    }
 }
 
 /// Hours of rendering should not end in an error that could be seen before, nor in the loss of the scene.

@@ -68,8 +68,7 @@ impl Renderer {
         ];
         let crop = [packed.params.crop_width, packed.params.crop_height];
         let pixels = tile_count(crop) as usize * TILE_PIXELS;
-        let most = MAX_SAMPLES.max(BLOCK_SAMPLES as usize * TILE_PIXELS);
-        let capacity = (pixels * 256).min(most);
+        let capacity = capacity(pixels);
         Ok(Renderer {
             device: device.clone(),
             path_trace,
@@ -77,15 +76,23 @@ impl Renderer {
             tables,
             params: Buffer::new(device, "params", &[packed.params])?,
             samples: Buffer::zeroed::<[f32; 4]>(device, "samples", capacity)?,
-            sums: Buffer::zeroed::<[f32; 4]>(
-                device,
-                "sums",
-                2 * capacity.div_ceil(BLOCK_SAMPLES as usize) + pixels.min(capacity) * 2,
-            )?,
+            sums: Buffer::zeroed::<[f32; 4]>(device, "sums", sums_length(pixels))?,
             invalid: Buffer::zeroed::<[u32; 4]>(device, "invalid", capacity / TILE_PIXELS)?,
             crop,
             capacity,
         })
+    }
+
+    /// Bytes that a crop window of so many pixels takes on the device, and on the host for the blocks of one dispatch; both
+    /// beside the tables of the scene.
+    pub fn working_memory(crop: [u32; 2]) -> (u64, u64) {
+        let pixels = tile_count(crop) as usize * TILE_PIXELS;
+        let capacity = capacity(pixels);
+        let quads = capacity + sums_length(pixels) + capacity / TILE_PIXELS;
+        // A block has a sum and a sum of squares for each channel of a pixel.
+        let blocks = (capacity / pixels / BLOCK_SAMPLES as usize).max(1);
+        let block = u64::from(crop[0]) * u64::from(crop[1]) * size_of::<[[f32; 3]; 2]>() as u64;
+        ((quads * size_of::<[f32; 4]>()) as u64, blocks as u64 * block)
     }
 
     /// Renders some samples of some tiles, and adds them to the blocks that they belong to.
@@ -183,6 +190,17 @@ fn render_all(renderer: &mut Renderer, samples: Range<u32>) -> Result<Vec<Block>
         first = last;
     }
     Ok(blocks)
+}
+
+/// Samples in flight for so many pixels.
+fn capacity(pixels: usize) -> usize {
+    (pixels * 256).min(MAX_SAMPLES.max(BLOCK_SAMPLES as usize * TILE_PIXELS))
+}
+
+/// Sums and sums of squares of the blocks in flight.
+fn sums_length(pixels: usize) -> usize {
+    let capacity = capacity(pixels);
+    2 * capacity.div_ceil(BLOCK_SAMPLES as usize) + pixels.min(capacity) * 2
 }
 
 fn tile_count(crop: [u32; 2]) -> u32 {

@@ -17,7 +17,8 @@ use super::path_vertex::{
 };
 use super::ray::offset_distance;
 use crate::pack::layout::{
-    LIGHT_VOLUME, PRIMITIVE_BOUNDARY, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
+    LIGHT_VOLUME, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SMOOTH,
+    SURFACE_TWO_SIDED,
 };
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
@@ -44,6 +45,7 @@ pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     path.radiance = DVec3::ZERO;
     path.alive = true;
     path.eta_scale = 1.0;
+    path.left = NONE;
     path.medium = params.camera_medium;
     begin_segment(tables, &mut path, u.zw());
     path
@@ -132,6 +134,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         let point = flight_point(tables, path, hit, end.way);
         path.offset = 0.0;
         path.normal = path.direction;
+        path.left = NONE;
         let (axis, surface, incident) = (path.direction, Surface::default(), DVec3::ZERO);
         let Medium { g, phase, .. } = medium;
         let (tangent, normal) = (DVec3::ZERO, DVec3::ZERO);
@@ -183,6 +186,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         }
         path.offset = offset_distance(largest);
         path.normal = normal;
+        path.left = if primitive.surface & PRIMITIVE_SPHERE == 0 { hit.primitive } else { NONE };
         let incident = to_surface_frame(tangent, axis, -path.direction);
         let (in_medium, g, phase, albedo) = (false, 0.0, 0, DVec3::ZERO);
         let vertex = Vertex { point, axis, in_medium, g, phase, albedo, surface, incident, tangent, normal };

@@ -57,6 +57,7 @@ pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit:
     // Distances first, the primitive's index among equals: surfaces that coincide are met one after the other, none
     // twice.
     let begins = t > path.t_min || (t == path.t_min && index > path.last && path.last != NONE);
+    let begins = begins && index != path.left;
     if path.shadow {
         let mut boundary = primitive.surface & PRIMITIVE_BOUNDARY != 0;
         let counts = begins && t < path.t_max;

@@ -88,6 +88,8 @@ pub struct Path {
     pub offset: f64,
     /// Only valid where `offset` is not 0.
     pub normal: DVec3,
+    /// The triangle on which the vertex lies, which its rays cannot meet again; else [`NONE`].
+    pub left: u32,
     /// The medium of the next segment.
     pub next_medium: u32,
     /// The product of squared indices that refraction divided radiance by.

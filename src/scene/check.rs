@@ -1,5 +1,5 @@
 //! What is doubtful about a scene: faults that no reader can refuse, since a scene with them is complete, but its picture
-//! is hardly the one that was meant. `pack::nesting` finds boundaries that overlap.
+//! is hardly the one that was meant.
 
 use std::collections::HashMap;
 
@@ -7,12 +7,15 @@ use glam::DVec3;
 
 use super::{Boundary, Geometry, MediumId, Mesh, Scene, Shape};
 
+mod crossings;
+mod triangles;
+
 /// All doubts, each a sentence that names the shape. Takes O(n log n) for n triangles, without allocating more than a few
 /// words for each.
 ///
 /// - any mesh: triangles that are there twice, triangles without area, shading normals that look to the other side;
-/// - boundaries of media: holes, neighbouring triangles with opposite orientation, normals that point inwards, and an
-///   exterior that is named but is not what lies around the boundary.
+/// - boundaries of media: holes, neighbouring triangles with opposite orientation, normals that point inwards, an
+///   exterior that is named but is not what lies around the boundary, and boundaries that cross each other or themselves.
 pub fn doubts(scene: &Scene) -> Vec<String> {
     let mut doubts = Vec::new();
     for shape in &scene.shapes {
@@ -23,7 +26,39 @@ pub fn doubts(scene: &Scene) -> Vec<String> {
         }
     }
     contradictions(scene, &mut doubts);
+    doubts.extend(crossings::doubts(scene));
     doubts
+}
+
+/// For each shape that is a boundary: the smallest boundary around it, by geometry, as an index into [`Scene::shapes`]; asked
+/// just outside of its first triangle. `None` for the others, and for those that nothing encloses. A parent has the larger
+/// bounds, so even where boundaries overlap this is a tree.
+pub fn parents(scene: &Scene) -> Vec<Option<usize>> {
+    let mut enclosing = Enclosing::default();
+    let parent = |(index, shape): (usize, &Shape)| {
+        shape.boundary?;
+        let around = enclosing.innermost(scene, *probes(&shape.geometry).first()?, Some(index))?;
+        let [own, parents] = [index, around].map(|index| {
+            let (low, high) = bounds(&scene.shapes[index].geometry);
+            ((high - low).element_product(), index)
+        });
+        (own < parents).then_some(around)
+    };
+    scene.shapes.iter().enumerate().map(parent).collect()
+}
+
+/// The smallest boundary around the camera, as an index into [`Scene::shapes`].
+pub fn around_camera(scene: &Scene) -> Option<usize> {
+    Enclosing::default().innermost(scene, scene.camera.to_world.w_axis.truncate(), None)
+}
+
+/// Whether every edge of a mesh belongs to as many triangles on one side as on the other; seams of texture coordinates do
+/// not count.
+pub fn is_closed(mesh: &Mesh) -> bool {
+    let places = weld(mesh);
+    let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|t| t.map(|corner| places[corner as usize])).collect();
+    let edges = Edges::of(triangles.iter().filter(|&&[a, b, c]| a != b && b != c && c != a));
+    edges.open == 0 && edges.inconsistent == 0
 }
 
 fn mesh_doubts(shape: &Shape, mesh: &Mesh, doubts: &mut Vec<String>) {
@@ -243,16 +278,19 @@ fn holds(geometry: &Geometry, point: DVec3) -> bool {
     match geometry {
         Geometry::Sphere { center, radius, .. } => point.distance(*center) < *radius,
         Geometry::Mesh(mesh) => {
-            let solid_angle = |triangle: &[u32; 3]| {
-                let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize] - point);
-                let (la, lb, lc) = (a.length(), b.length(), c.length());
-                let cosine = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-                2.0 * a.dot(b.cross(c)).atan2(cosine)
-            };
-            let total: f64 = mesh.triangles.iter().map(solid_angle).sum();
+            let corners = |triangle: &[u32; 3]| triangle.map(|corner| mesh.positions[corner as usize]);
+            let total: f64 = mesh.triangles.iter().map(|triangle| solid_angle(&corners(triangle), point)).sum();
             total.abs() > 2.0 * std::f64::consts::PI
         }
     }
+}
+
+/// Signed solid angle of a triangle (van Oosterom and Strackee 1983).
+fn solid_angle(triangle: &[DVec3; 3], point: DVec3) -> f64 {
+    let [a, b, c] = triangle.map(|corner| corner - point);
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let cosine = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    2.0 * a.dot(b.cross(c)).atan2(cosine)
 }
 
 /// Points just outside of a surface.

@@ -25,6 +25,7 @@ mod error;
 pub mod mesh;
 pub mod mitsuba;
 mod phase;
+pub mod spectrum;
 mod texture;
 
 pub use bitmap::Bitmap;

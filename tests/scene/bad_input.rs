@@ -130,16 +130,16 @@ fn values() {
         ("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" ‸value=\"1 2\"/></bsdf>", &["2 numbers"]),
         ("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" ‸value=\"#12345\"/></bsdf>", &["#rrggbb"]),
         (
-            "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" ‸value=\"400:1,700:2\"/></bsdf>",
-            &["one value for all wavelengths"],
+            "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" ‸value=\"400:1,700\"/></bsdf>",
+            &["\"700\" is not a wavelength and a value"],
         ),
         (
-            "<bsdf type=\"diffuse\">‸<spectrum name=\"reflectance\" type=\"d65\"/></bsdf>",
-            &["one value for all wavelengths"],
+            "<bsdf type=\"diffuse\">‸<spectrum name=\"reflectance\" type=\"d66\"/></bsdf>",
+            &["<spectrum type=\"d66\"> is not supported", "did you mean \"d65\"?"],
         ),
         (
-            "<bsdf type=\"diffuse\">‸<spectrum name=\"reflectance\" filename=\"a.spd\"/></bsdf>",
-            &["one value for all wavelengths"],
+            "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" ‸filename=\"a.spd\"/></bsdf>",
+            &["cannot read the spectrum", "a.spd"],
         ),
         (
             "<medium type=\"homogeneous\">‸<texture name=\"sigma_t\" type=\"bitmap\"/></medium>",
@@ -199,8 +199,11 @@ fn transforms() {
 fn shapes() {
     table(&[
         (
-            "‸<shape type=\"disk\"/>",
-            &["<shape type=\"disk\"> is not supported", "accepted types: obj, rectangle, cube, sphere"],
+            "‸<shape type=\"heightfield\"/>",
+            &[
+                "<shape type=\"heightfield\"> is not supported",
+                "accepted types: obj, ply, serialized, rectangle, cube, sphere, disk",
+            ],
         ),
         ("‸<shape type=\"spheer\"/>", &["did you mean \"sphere\"?"]),
         (

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use tyndall::scene::mitsuba::{refused_plugins, supported_plugins};
+
 use crate::{LIGHT, SENSOR, parse};
 
 const PAGE: &str = include_str!("../../docs/SCENES.md");
@@ -39,6 +41,10 @@ fn every_property_is_documented() {
     let sampler =
         r#"<sensor type="perspective"><float name="fov" value="1"/><sampler type="ldsampler">‸</sampler></sensor>"#;
     let ball = r#"<shape type="obj"><string name="filename" value="meshes/ball.obj"/>‸</shape>"#;
+    let ply = r#"<shape type="ply"><string name="filename" value="meshes/triangle.ply"/>‸</shape>"#;
+    let serialized =
+        r#"<shape type="serialized"><string name="filename" value="meshes/triangle.serialized"/>‸</shape>"#;
+    let instance = r#"<shape type="shapegroup" id="group"/><shape type="instance"><ref id="group"/>‸</shape>"#;
     let blend = format!(
         r#"<phase type="blendphase"><float name="weight" value="0"/>{0}{0}‸</phase>"#,
         r#"<phase type="isotropic"/>"#
@@ -54,6 +60,11 @@ fn every_property_is_documented() {
         ("### `<film type=\"hdrfilm\">`", film, &[]),
         ("### `<sampler type=\"independent\">`", sampler, &[]),
         ("### `<integrator type=\"volpath\">`", r#"<integrator type="volpathmis">‸</integrator>"#, &[]),
+        (
+            "### `<integrator type=\"moment\">`",
+            r#"<integrator type="aov"><integrator type="path"/>‸</integrator>"#,
+            &[],
+        ),
         ("### `<medium type=\"homogeneous\">`", r#"<medium type="homogeneous">‸</medium>"#, &[]),
         ("### `<phase type=\"hg\">`", r#"<phase type="hg">‸</phase>"#, &[]),
         ("### `<phase type=\"blendphase\">`", &blend, &[]),
@@ -63,6 +74,11 @@ fn every_property_is_documented() {
             &[],
         ),
         ("### `<shape type=\"obj\">`", ball, shape),
+        ("### `<shape type=\"ply\">`", ply, shape),
+        ("### `<shape type=\"serialized\">`", serialized, shape),
+        ("### `<shape type=\"disk\">`", r#"<shape type="disk">‸</shape>"#, shape),
+        ("### `<shape type=\"cylinder\">`", r#"<shape type="cylinder">‸</shape>"#, shape),
+        ("### `<shape type=\"instance\">`", instance, &[]),
         ("### `<shape type=\"rectangle\">`", r#"<shape type="rectangle">‸</shape>"#, shape),
         ("### `<shape type=\"cube\">`", r#"<shape type="cube">‸</shape>"#, shape),
         ("### `<shape type=\"sphere\">`", r#"<shape type="sphere">‸</shape>"#, shape),
@@ -93,5 +109,86 @@ fn every_property_is_documented() {
                 assert_ne!(difference(&wrong, heading, element, common), [""; 0], "{heading} {name}");
             }
         }
+    }
+}
+
+/// A plugin with what it needs, and the place of a property that does not exist.
+fn example(tag: &str, kind: &str) -> String {
+    let string = |name: &str, value: &str| format!(r#"<string name="{name}" value="{value}"/>"#);
+    let inside = match (tag, kind) {
+        ("integrator", "moment" | "aov") => r#"<integrator type="path"/>"#.to_owned(),
+        ("sensor", _) => r#"<float name="fov" value="1"/>"#.to_owned(),
+        ("phase", "blendphase") => r#"<float name="weight" value="0"/><phase type="hg"/><phase type="hg"/>"#.to_owned(),
+        ("phase", "tabphase") => string("values", "1 1"),
+        ("shape", "obj") => string("filename", "meshes/ball.obj"),
+        ("shape", "ply" | "serialized") => string("filename", &format!("meshes/triangle.{kind}")),
+        ("shape", "instance") => r#"<shape type="shapegroup"/>"#.to_owned(),
+        ("bsdf", "mask" | "twosided") => r#"<bsdf type="diffuse"/>"#.to_owned(),
+        ("texture", "bitmap") => string("filename", "textures/colors.png"),
+        ("emitter", "envmap") => string("filename", "textures/sky.exr"),
+        ("spectrum", "blackbody") => r#"<float name="temperature" value="1"/>"#.to_owned(),
+        ("spectrum", "regular") => {
+            let limits = r#"<float name="wavelength_min" value="400"/><float name="wavelength_max" value="700"/>"#;
+            limits.to_owned() + &string("values", "1 1")
+        }
+        ("spectrum", "irregular") => string("wavelengths", "400 700") + &string("values", "1 1"),
+        _ => String::new(),
+    };
+    let name = if tag == "spectrum" { r#"name="radiance" "# } else { "" };
+    let plugin = format!(r#"<{tag} {name}type="{kind}">{inside}‸</{tag}>"#);
+    let sensor = |inside: &str| format!(r#"<sensor type="perspective"><float name="fov" value="1"/>{inside}</sensor>"#);
+    match (tag, kind) {
+        ("film" | "sampler", _) => sensor(&plugin),
+        ("rfilter", _) => sensor(&format!(r#"<film type="hdrfilm">{plugin}</film>"#)),
+        ("spectrum", _) => format!(r#"<emitter type="constant">{plugin}</emitter>"#),
+        ("emitter", "area") => format!(r#"<shape type="cube">{plugin}</shape>"#),
+        _ => plugin,
+    }
+}
+
+/// The tables at the end of the page.
+fn tables() -> String {
+    let mut text = "| supported | properties |\n|---|---|\n".to_owned();
+    for (tag, kinds) in supported_plugins() {
+        for kind in kinds {
+            let names: Vec<String> =
+                accepted(&example(&tag, kind)).into_iter().map(|name| format!("`{name}`")).collect();
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            text += &format!("| `<{tag} type=\"{kind}\">` | {names} |\n");
+        }
+    }
+    text += "\n| not supported | instead |\n|---|---|\n";
+    for (tag, kind, advice) in refused_plugins() {
+        text += &format!("| `<{tag} type=\"{kind}\">` | {advice} |\n");
+    }
+    text
+}
+
+#[test]
+fn the_tables_of_plugins_are_current() {
+    let (begin, end) = ("<!-- begin: plugins -->\n", "<!-- end: plugins -->\n");
+    let (before, rest) = PAGE.split_once(begin).expect("the page has the mark");
+    let (found, after) = rest.split_once(end).expect("the page has the mark");
+    let tables = tables();
+    if std::env::var_os("TYNDALL_WRITE_DOCS").is_some() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/SCENES.md");
+        std::fs::write(path, format!("{before}{begin}{tables}{end}{after}")).unwrap();
+        return;
+    }
+    assert_eq!(found, tables, "TYNDALL_WRITE_DOCS=1 cargo test --test scene docs writes the tables");
+}
+
+#[test]
+fn plugins_that_are_not_supported_say_what_to_use() {
+    for (tag, kind, advice) in refused_plugins() {
+        // Volumes stand in media alone, which have no use for any.
+        if tag == "volume" {
+            continue;
+        }
+        let text = example(&tag, kind).replace('‸', "");
+        let sensor = if text.contains("<sensor") { "" } else { SENSOR };
+        let error = parse(&format!("<scene version=\"3.0.0\">{sensor}{LIGHT}{text}</scene>")).unwrap_err().to_string();
+        let expected = format!("<{tag} type=\"{kind}\"> is not supported; {advice}; accepted types: ");
+        assert!(error.contains(&expected), "{expected}\n{error}");
     }
 }

@@ -116,6 +116,34 @@ fn lights() {
 }
 
 #[test]
+fn integrators_around_others() {
+    let inner = r#"<integrator type="path"><integer name="max_depth" value="5"/></integrator>"#;
+    assert_eq!(integrator(&format!(r#"<integrator type="moment">{inner}</integrator>"#)).max_depth, Some(5));
+    let aov = format!(r#"<integrator type="aov"><string name="aovs" value="d:depth"/>{inner}</integrator>"#);
+    assert!(warning(&aov).ends_with("the channels \"d:depth\" are not written"));
+    let error = |body: &str| {
+        let text = format!("<scene version=\"3.0.0\">{}{}{body}</scene>", crate::SENSOR, crate::LIGHT);
+        crate::parse(&text).unwrap_err().to_string()
+    };
+    for (inside, message) in [
+        (String::new(), "holds 0 integrators; it must hold one"),
+        (inner.repeat(2), "holds 2 integrators; it must hold one"),
+        (r#"<ref id="outer"/>"#.to_owned(), "cannot hold <integrator type=\"moment\">"),
+        (r#"<integrator type="ptracer"/>"#.to_owned(), "<integrator type=\"ptracer\"> is not supported"),
+    ] {
+        let text = error(&format!(r#"<integrator type="moment" id="outer">{inside}</integrator>"#));
+        assert!(text.contains(message), "{inside}: {text}");
+    }
+    let samples = r#"<integer name="emitter_samples" value="4"/><integer name="bsdf_samples" value="2"/>"#;
+    assert_eq!(integrator(&format!(r#"<integrator type="direct">{samples}</integrator>"#)).max_depth, Some(2));
+    let timeout = r#"<integrator type="path"><float name="timeout" value="90"/></integrator>"#;
+    assert!(warning(timeout).ends_with("the timeout has no effect; use --time-limit 90s"));
+    // Mitsuba's surface integrators see no media, in a wrapper or not.
+    let fog = r#"<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="interior"/></shape>"#;
+    assert!(warning(&format!(r#"{fog}<integrator type="moment">{inner}</integrator>"#)).contains("would ignore"));
+}
+
+#[test]
 fn integrators() {
     assert_eq!(integrator(""), Integrator::default());
     for plugin in ["volpath", "volpathmis", "path"] {

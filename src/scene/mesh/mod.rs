@@ -5,6 +5,21 @@ use glam::{DMat3, DMat4, DVec2, DVec3};
 use super::Mesh;
 
 pub mod obj;
+pub mod ply;
+mod round;
+pub mod serialized;
+
+pub use round::{SEGMENTS, cylinder, disk};
+
+/// A mesh as it is in a file: normals are unit vectors, or zero where the file has none for a vertex, and texture coordinates
+/// are as in the file.
+#[derive(Clone, Debug)]
+pub struct FileMesh {
+    /// The mesh; the lists of normals and texture coordinates are empty if the file has none at all.
+    pub mesh: Mesh,
+    /// Vertices without texture coordinates in a file in which others have some; theirs are (0, 0).
+    pub missing_uvs: usize,
+}
 
 impl Mesh {
     /// Moves every vertex. The order of corners stays, so a mirroring transform turns the geometric normals around; shading

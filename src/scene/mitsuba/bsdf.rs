@@ -10,7 +10,7 @@ use super::texture::{choice, fraction, gray_fraction};
 use super::tree::Kind;
 use crate::scene::{Bsdf, Distribution, Roughness, SceneError};
 
-const TYPES: [&str; 11] = [
+pub(super) const TYPES: [&str; 11] = [
     "diffuse",
     "null",
     "twosided",

@@ -4,9 +4,11 @@ use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::mesh_file::MeshKey;
 use super::props::{Child, Props};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
 use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture};
+use crate::scene::mesh::FileMesh;
 use crate::scene::{Bitmap, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape};
 
 /// What the converters of single objects share.
@@ -16,6 +18,8 @@ pub(super) struct Context<'a> {
     pub media: Vec<Medium>,
     /// Images by file, and whether they are raw.
     pub images: HashMap<(PathBuf, bool), Arc<Bitmap>>,
+    /// Meshes as they are in their files.
+    pub meshes: HashMap<MeshKey, Arc<FileMesh>>,
     medium_ids: HashMap<ObjectId, MediumId>,
 }
 
@@ -41,8 +45,8 @@ impl<'a> Context<'a> {
 /// The scene that a tree describes.
 pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     let root = &tree.objects[0];
-    let (images, medium_ids) = (HashMap::new(), HashMap::new());
-    let mut context = Context { tree, warnings: Vec::new(), media: Vec::new(), images, medium_ids };
+    let (images, meshes, medium_ids) = (HashMap::new(), HashMap::new(), HashMap::new());
+    let mut context = Context { tree, warnings: Vec::new(), media: Vec::new(), images, meshes, medium_ids };
     let props = Props::new(tree, root);
     refuse_doubles(root)?;
 
@@ -58,13 +62,18 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
 
     let integrator_child = props.child(Kind::Integrator)?;
     let integrator = match integrator_child {
-        Some(child) => integrator::convert(&context, child)?,
+        Some(child) => integrator::convert(&mut context, child)?,
         None => Integrator::default(),
     };
 
     let mut shapes = Vec::new();
     for child in props.children(Kind::Shape) {
         shapes.extend(shape::convert(&mut context, child)?);
+        if child.object.plugin == "shapegroup" && !used(tree).contains(&child.id) {
+            let name = child.object.id.as_deref().map_or(String::new(), |id| format!(" \"{id}\""));
+            let text = format!("the group{name} has no instance, so nothing of it is seen");
+            context.warnings.push(child.at.warning(text));
+        }
     }
     let mut lights = Vec::new();
     for child in props.children(Kind::Emitter) {
@@ -88,14 +97,17 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
         lights,
         sample_count: sensor.sample_count,
     };
+    context.warnings.extend(tree.warnings());
+    // A shape in a group is read for each instance, and warned about each time.
+    let mut said = HashSet::new();
+    context.warnings.retain(|warning| said.insert(warning.clone()));
     Ok(Loaded { scene, warnings: context.warnings })
 }
 
 /// Media, BSDFs and textures that stand directly in the scene are there to be referred to. They are checked even if nobody does,
 /// since a fault in them is one that waits.
 fn declarations<'a>(context: &mut Context<'a>, props: &Props<'a>) -> Result<(), SceneError> {
-    let used: HashSet<ObjectId> =
-        context.tree.objects.iter().skip(1).flat_map(targets).map(|(_, target)| target).collect();
+    let used = used(context.tree);
     for kind in [Kind::Medium, Kind::Bsdf, Kind::Phase, Kind::Texture] {
         for child in props.children(kind) {
             match kind {
@@ -112,6 +124,11 @@ fn declarations<'a>(context: &mut Context<'a>, props: &Props<'a>) -> Result<(), 
         }
     }
     Ok(())
+}
+
+/// What objects other than the scene hold or refer to.
+fn used(tree: &Tree) -> HashSet<ObjectId> {
+    tree.objects.iter().skip(1).flat_map(targets).map(|(_, target)| target).collect()
 }
 
 /// The objects that an object holds or refers to.

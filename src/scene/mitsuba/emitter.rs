@@ -11,7 +11,7 @@ use super::transform::rigid;
 use super::tree::Kind;
 use crate::scene::{Light, SceneError};
 
-const TYPES: [&str; 6] = ["area", "point", "spot", "directional", "constant", "envmap"];
+pub(super) const TYPES: [&str; 6] = ["area", "point", "spot", "directional", "constant", "envmap"];
 
 /// The radiance of an `area` emitter inside a shape.
 pub(super) fn area<'a>(context: &Context<'a>, child: Child<'a>) -> Result<DVec3, SceneError> {

@@ -5,9 +5,9 @@ use super::props::{Child, Props, unknown_plugin};
 use super::tree::Kind;
 use crate::scene::{Crop, Film, SceneError};
 
-const FILM_TYPES: [&str; 1] = ["hdrfilm"];
-const SAMPLER_TYPES: [&str; 5] = ["independent", "stratified", "multijitter", "orthogonal", "ldsampler"];
-const FILTER_TYPES: [&str; 6] = ["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"];
+pub(super) const FILM_TYPES: [&str; 1] = ["hdrfilm"];
+pub(super) const SAMPLER_TYPES: [&str; 5] = ["independent", "stratified", "multijitter", "orthogonal", "ldsampler"];
+pub(super) const FILTER_TYPES: [&str; 6] = ["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"];
 
 /// The film that Mitsuba takes where a sensor has none.
 pub(super) fn default_film() -> Film {

@@ -1,21 +1,30 @@
 //! `<integrator>`: how long paths may get.
 
 use super::build::Context;
-use super::props::{Child, unknown_plugin};
+use super::props::{Child, Props, unknown_plugin};
+use super::tree::Kind;
 use crate::scene::{Integrator, SceneError};
 
-const TYPES: [&str; 4] = ["volpath", "volpathmis", "path", "direct"];
+pub(super) const TYPES: [&str; 6] = ["volpath", "volpathmis", "path", "direct", "moment", "aov"];
 
-/// The integrator of the scene. All types stand for the same estimator; `direct` is one of depth 2.
-pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Integrator, SceneError> {
+/// The integrator of the scene. All types stand for the same estimator; `direct` is one of depth 2, and `moment` and `aov` are
+/// the one inside of them.
+pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Integrator, SceneError> {
     let plugin = child.object.plugin.as_str();
     if !TYPES.contains(&plugin) {
         return Err(unknown_plugin(child.object, &TYPES));
     }
     let props = context.props(child);
+    if matches!(plugin, "moment" | "aov") {
+        return wrapped(context, child, props);
+    }
     let mut integrator = Integrator::default();
     if plugin == "direct" {
         integrator.max_depth = Some(2);
+        // How often Mitsuba samples in each way.
+        for name in ["shading_samples", "emitter_samples", "bsdf_samples"] {
+            props.integer(name)?;
+        }
     } else {
         if let Some(depth) = props.integer("max_depth")? {
             integrator.max_depth = match depth.value {
@@ -44,13 +53,45 @@ pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Int
     // How Mitsuba cuts the work up, which does not change what is computed.
     props.integer("block_size")?;
     props.integer("samples_per_pass")?;
+    if let Some(timeout) = props.float("timeout")?
+        && timeout.value > 0.0
+    {
+        let text = format!("the timeout has no effect; use --time-limit {}s", timeout.value);
+        context.warnings.push(timeout.at.warning(text));
+    }
     props.finish()?;
     Ok(integrator)
 }
 
+/// The integrator inside of `moment` or `aov`.
+fn wrapped<'a>(context: &mut Context<'a>, child: Child<'a>, props: Props<'a>) -> Result<Integrator, SceneError> {
+    let inside = props.children(Kind::Integrator);
+    if child.object.plugin == "aov"
+        && let Some(aovs) = props.string("aovs")?
+    {
+        let text = format!("the channels \"{}\" are not written", aovs.value);
+        context.warnings.push(aovs.at.warning(text));
+    }
+    props.integer("block_size")?;
+    props.integer("samples_per_pass")?;
+    props.finish()?;
+    let [inner] = inside[..] else {
+        let (what, count) = (child.object.describe(), inside.len());
+        return Err(child.object.at.error(format!("{what} holds {count} integrators; it must hold one")));
+    };
+    // One could hold itself by a <ref>.
+    if matches!(inner.object.plugin.as_str(), "moment" | "aov") {
+        let (what, found) = (child.object.describe(), inner.object.describe());
+        return Err(inner.at.error(format!("{what} cannot hold {found}; it must hold one that renders")));
+    }
+    convert(context, inner)
+}
+
 /// Mitsuba's surface integrators see no media; ours always does.
 pub(super) fn warn_about_media<'a>(context: &mut Context<'a>, child: Child<'a>) {
-    let plugin = child.object.plugin.as_str();
+    // What a wrapper holds was checked when it was read.
+    let inner = context.props(child).children(Kind::Integrator).first().copied().unwrap_or(child);
+    let plugin = inner.object.plugin.as_str();
     if matches!(plugin, "path" | "direct") && !context.media.is_empty() {
         let text = format!("the media of the scene are rendered, which Mitsuba's \"{plugin}\" would ignore");
         context.warnings.push(child.at.warning(text));

@@ -7,8 +7,8 @@ use super::props::{Child, Given, Props, unknown_plugin};
 use super::tree::Kind;
 use crate::scene::{Medium, Phase, SceneError};
 
-const TYPES: [&str; 1] = ["homogeneous"];
-const PHASE_TYPES: [&str; 5] = ["isotropic", "hg", "rayleigh", "blendphase", "tabphase"];
+pub(super) const TYPES: [&str; 1] = ["homogeneous"];
+pub(super) const PHASE_TYPES: [&str; 5] = ["isotropic", "hg", "rayleigh", "blendphase", "tabphase"];
 
 /// A homogeneous medium, from `sigma_t` and `albedo` as in Mitsuba 3 or from `sigma_s` and `sigma_a` as in 0.6.
 pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Medium, SceneError> {
@@ -16,7 +16,7 @@ pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Med
         return Err(unknown_plugin(child.object, &TYPES));
     }
     let props = context.props(child);
-    let (sigma_t, albedo) = (props.color("sigma_t")?, props.color("albedo")?);
+    let (sigma_t, albedo) = (props.color("sigma_t")?, props.fraction("albedo")?);
     let (sigma_s, sigma_a) = (props.color("sigma_s")?, props.color("sigma_a")?);
     let (scale, emission) = (props.float("scale")?, props.emission("emission")?);
     // Choices of Mitsuba's estimators; the medium is the same.

@@ -16,11 +16,14 @@ mod film;
 mod integrator;
 mod material;
 mod medium;
+mod mesh_file;
 mod params;
+mod plugins;
 mod props;
 mod sensor;
 mod shape;
 mod source;
+mod spectrum;
 mod suggest;
 mod texture;
 mod transform;
@@ -50,4 +53,16 @@ pub fn parse_str(text: &str, file: &Path, overrides: &[(String, String)]) -> Res
     let folder = file.parent().unwrap_or(Path::new(""));
     let tree = xml::read(text, &file.display().to_string(), folder, overrides)?;
     build::build(&tree)
+}
+
+/// Tags of elements with the types that are supported, for documentation.
+pub fn supported_plugins() -> Vec<(String, &'static [&'static str])> {
+    plugins::SUPPORTED.iter().map(|(kind, types)| (kind.to_string(), *types)).collect()
+}
+
+/// Tags and types of the plugins of Mitsuba 3.9 that are not supported, each with what to use instead, for documentation.
+pub fn refused_plugins() -> Vec<(String, &'static str, &'static str)> {
+    let supported = |kind, plugin| plugins::SUPPORTED.iter().any(|(k, types)| *k == kind && types.contains(&plugin));
+    let refused = plugins::REFUSED.iter().filter(|(kind, plugin, _)| !supported(*kind, *plugin));
+    refused.map(|(kind, plugin, advice)| (kind.to_string(), *plugin, *advice)).collect()
 }

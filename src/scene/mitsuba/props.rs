@@ -5,6 +5,8 @@ use std::cell::{Cell, RefCell};
 
 use glam::{DMat4, DVec3};
 
+use super::plugins;
+use super::spectrum::{self, Color, Meaning};
 use super::suggest::{did_you_mean, list};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
 use crate::scene::SceneError;
@@ -46,17 +48,6 @@ pub(super) enum Colored<'a> {
 pub(super) enum NumberOrName {
     Number(f64),
     Name(String),
-}
-
-/// The three channels of a value; `constant` is what a spectrum of 1 becomes.
-fn color_of(value: &Value, constant: DVec3) -> Option<DVec3> {
-    match *value {
-        Value::Rgb(v) => Some(v),
-        Value::Float(v) => Some(DVec3::splat(v)),
-        Value::Integer(v) => Some(DVec3::splat(v as f64)),
-        Value::Spectrum(v) => Some(v * constant),
-        _ => None,
-    }
 }
 
 impl<'a> Props<'a> {
@@ -121,6 +112,11 @@ impl<'a> Props<'a> {
         })
     }
 
+    /// A whole number that only some plugins have.
+    pub fn integer_if(&self, name: &'static str, has: bool) -> Result<Option<Given<'a, i64>>, SceneError> {
+        if has { self.integer(name) } else { Ok(None) }
+    }
+
     /// A truth value.
     pub fn boolean(&self, name: &'static str) -> Result<Option<Given<'a, bool>>, SceneError> {
         self.typed(name, "<boolean>", |value| match *value {
@@ -153,19 +149,23 @@ impl<'a> Props<'a> {
         })
     }
 
-    /// A quantity of each channel that does not emit: reflectance, albedo, extinction. A constant spectrum has the
-    /// same value in all channels.
-    pub fn color(&self, name: &'static str) -> Result<Option<Given<'a, DVec3>>, SceneError> {
-        self.spectrum(name, DVec3::ONE)
+    /// A quantity of each channel that does not emit: extinction, an index of refraction. A constant spectrum has the same value in
+    /// all channels.
+    pub fn color(&self, name: &'static str) -> Result<Option<Color<'a>>, SceneError> {
+        self.spectrum(name, Meaning::Factor, false)
     }
 
-    /// A radiance or an intensity. A constant spectrum is white point E, which is reddish in sRGB, whose white is
-    /// D65: the XYZ to sRGB matrix (IEC 61966-2-1) times (1, 1, 1). Mitsuba 3.9 converts in the same way.
-    pub fn emission(&self, name: &'static str) -> Result<Option<Given<'a, DVec3>>, SceneError> {
-        self.spectrum(name, DVec3::new(1.204_794, 0.948_291, 0.908_916))
+    /// The same for what does not exceed 1.
+    pub fn fraction(&self, name: &'static str) -> Result<Option<Color<'a>>, SceneError> {
+        self.spectrum(name, Meaning::Fraction, false)
     }
 
-    /// A quantity of each channel, or a texture that has it.
+    /// A radiance or an intensity.
+    pub fn emission(&self, name: &'static str) -> Result<Option<Color<'a>>, SceneError> {
+        self.spectrum(name, Meaning::Emitted, false)
+    }
+
+    /// A quantity of each channel that does not exceed 1, or a texture that has it.
     pub fn color_or_texture(&self, name: &'static str) -> Result<Option<Colored<'a>>, SceneError> {
         if let Some(property) = self.find(name)
             && let Value::Object(id) = property.value
@@ -174,8 +174,7 @@ impl<'a> Props<'a> {
             let object = &self.tree.objects[id];
             return Ok(Some(Colored::Texture(Child { id, object, name: Some(name), at: &property.at })));
         }
-        let given = self.typed(name, "<rgb>, <float>, <spectrum> or <texture>", |value| color_of(value, DVec3::ONE))?;
-        Ok(given.map(Colored::Constant))
+        Ok(self.spectrum(name, Meaning::Fraction, true)?.map(Colored::Constant))
     }
 
     /// A refractive index: a number, or the name of a material.
@@ -188,8 +187,13 @@ impl<'a> Props<'a> {
         })
     }
 
-    fn spectrum(&self, name: &'static str, constant: DVec3) -> Result<Option<Given<'a, DVec3>>, SceneError> {
-        self.typed(name, "<rgb>, <float> or <spectrum>", |value| color_of(value, constant))
+    fn spectrum(&self, name: &'static str, meaning: Meaning, texture: bool) -> Result<Option<Color<'a>>, SceneError> {
+        let Some(property) = self.find(name) else { return Ok(None) };
+        match spectrum::color_of(self.tree, &property.value, &property.at, meaning)? {
+            Some(value) => Ok(Some(Given { value, at: &property.at })),
+            None if texture => self.typed(name, "<rgb>, <float>, <spectrum> or <texture>", |_| None),
+            None => self.typed(name, "<rgb>, <float> or <spectrum>", |_| None),
+        }
     }
 
     /// Accepts a property that does not change the picture.
@@ -249,12 +253,13 @@ impl<'a> Props<'a> {
     }
 }
 
-/// The error about a plugin that is not supported.
+/// The error about a plugin that is not supported, with what to use instead if it is one of Mitsuba.
 pub(super) fn unknown_plugin(object: &Object, accepted: &[&str]) -> SceneError {
+    let instead = plugins::instead(object);
+    let hint = if instead.is_empty() { did_you_mean(&object.plugin, accepted.iter().copied()) } else { instead };
     object.at.error(format!(
-        "{} is not supported{}; accepted types: {}",
+        "{} is not supported{hint}; accepted types: {}",
         object.describe(),
-        did_you_mean(&object.plugin, accepted.iter().copied()),
         list(accepted.iter().copied())
     ))
 }

@@ -9,7 +9,7 @@ use super::transform::rigid;
 use super::tree::Kind;
 use crate::scene::{Camera, Film, SceneError};
 
-const TYPES: [&str; 1] = ["perspective"];
+pub(super) const TYPES: [&str; 1] = ["perspective"];
 const FOV_AXES: [&str; 5] = ["x", "y", "smaller", "larger", "diagonal"];
 
 /// What a sensor says.

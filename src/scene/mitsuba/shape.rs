@@ -5,25 +5,82 @@ use glam::{DMat3, DMat4, DVec3};
 use super::build::Context;
 use super::props::{Child, Props, unknown_plugin};
 use super::tree::Kind;
-use super::{bsdf, emitter, source};
-use crate::scene::mesh::{self, obj};
-use crate::scene::{Boundary, Bsdf, Geometry, Mesh, SceneError, Shape};
+use super::{bsdf, emitter, mesh_file};
+use crate::scene::mesh;
+use crate::scene::{Boundary, Bsdf, Geometry, SceneError, Shape};
 
-const TYPES: [&str; 4] = ["obj", "rectangle", "cube", "sphere"];
+/// Shapes that have points.
+pub(super) const TYPES: [&str; 10] =
+    ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance"];
 
 /// The points of a shape, and what was found out on the way.
-struct Outline {
+pub(super) struct Outline {
     /// `None` if nothing is left of a mesh.
-    geometry: Option<Geometry>,
-    name: String,
+    pub geometry: Option<Geometry>,
+    pub name: String,
     /// `to_world` turns or mirrors a sphere, which has texture coordinates but no axes of its own.
-    turned: bool,
+    pub turned: bool,
     /// How a mirroring transform changed the normals, if it did in a way that is worth a warning.
-    mirrored: Option<&'static str>,
+    pub mirrored: Option<&'static str>,
 }
 
-/// A shape, or `None` for a mesh that has no area at all.
-pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Option<Shape>, SceneError> {
+/// The surfaces that a shape of the scene stands for: none for a group, whose shapes are where instances put them, and one
+/// otherwise, or none if nothing is left of its mesh.
+pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Vec<Shape>, SceneError> {
+    match child.object.plugin.as_str() {
+        "shapegroup" => {
+            // Made as well and thrown away, since a fault in a group that nobody puts anywhere is one that waits.
+            group(context, child, &DMat4::IDENTITY)?;
+            Ok(Vec::new())
+        }
+        "instance" => instance(context, child),
+        _ => Ok(single(context, child, &DMat4::IDENTITY)?.into_iter().collect()),
+    }
+}
+
+/// The shapes of a group, moved.
+fn group<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Result<Vec<Shape>, SceneError> {
+    let props = context.props(child);
+    let inside = props.children(Kind::Shape);
+    props.finish()?;
+    let mut shapes = Vec::new();
+    for part in inside {
+        if matches!(part.object.plugin.as_str(), "shapegroup" | "instance") {
+            let what = part.object.describe();
+            return Err(part.at.error(format!("<shape type=\"shapegroup\"> cannot hold {what}")));
+        }
+        shapes.extend(single(context, part, outer)?);
+    }
+    Ok(shapes)
+}
+
+/// A copy of a group. It shares nothing with other copies: each has triangles of its own, in world space.
+fn instance<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Vec<Shape>, SceneError> {
+    let props = context.props(child);
+    let to_world = to_world(&props, &DMat4::IDENTITY)?;
+    let groups = props.children(Kind::Shape);
+    props.finish()?;
+    let [inner] = groups[..] else {
+        let count = groups.len();
+        return Err(child.object.at.error(format!(
+            "<shape type=\"instance\"> holds {count} shapes; it must hold one <ref> to a <shape type=\"shapegroup\">"
+        )));
+    };
+    if inner.object.plugin != "shapegroup" {
+        let what = inner.object.describe();
+        return Err(inner
+            .at
+            .error(format!("<shape type=\"instance\"> cannot hold {what}; it must be a <shape type=\"shapegroup\">")));
+    }
+    let mut shapes = group(context, inner, &to_world)?;
+    if let Some(id) = &child.object.id {
+        shapes.iter_mut().for_each(|shape| shape.name = format!("{id}/{}", shape.name));
+    }
+    Ok(shapes)
+}
+
+/// A shape that `outer` moves after its own `to_world`, or `None` for a mesh that has no area at all.
+fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Result<Option<Shape>, SceneError> {
     let plugin = child.object.plugin.as_str();
     if !TYPES.contains(&plugin) {
         return Err(unknown_plugin(child.object, &TYPES));
@@ -42,15 +99,23 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
     // A weight of Mitsuba's gradients.
     props.float("silhouette_sampling_weight")?;
     let outline = match plugin {
-        "sphere" => sphere(&props, flip)?,
-        "obj" => triangles(context, child, &props, flip)?,
-        _ => analytic(&props, plugin, flip)?,
+        "sphere" => sphere(&props, flip, outer)?,
+        "obj" | "ply" | "serialized" => mesh_file::outline(context, child, &props, flip, outer)?,
+        _ => analytic(&props, plugin, flip, outer)?,
     };
     props.finish()?;
+    if matches!(plugin, "disk" | "cylinder") {
+        let text = format!(
+            "this {plugin} is rendered with {} flat faces, with the same {}",
+            mesh::SEGMENTS,
+            if plugin == "disk" { "area" } else { "volume" }
+        );
+        context.warnings.push(child.object.at.warning(text));
+    }
 
     if let (Some(why), Some(geometry)) = (bsdf.needs_uvs(), &outline.geometry) {
         let text = match geometry {
-            Geometry::Mesh(mesh) if mesh.uvs.is_empty() => "but its mesh has no texture coordinates (vt)",
+            Geometry::Mesh(mesh) if mesh.uvs.is_empty() => "but its mesh has no texture coordinates",
             Geometry::Sphere { .. } if outline.turned => {
                 "but its to_world turns or mirrors it; only spheres that are moved and scaled can have one"
             }
@@ -104,24 +169,24 @@ fn boundary<'a>(context: &mut Context<'a>, props: &Props<'a>) -> Result<Option<B
     Ok(any.then_some(boundary))
 }
 
-/// `to_world`, which must have an inverse.
-fn to_world(props: &Props) -> Result<DMat4, SceneError> {
-    let Some(given) = props.transform("to_world")? else { return Ok(DMat4::IDENTITY) };
+/// `to_world`, which must have an inverse, and `outer` behind it.
+pub(super) fn to_world(props: &Props, outer: &DMat4) -> Result<DMat4, SceneError> {
+    let Some(given) = props.transform("to_world")? else { return Ok(*outer) };
     let determinant = DMat3::from_mat4(given.value).determinant();
     if determinant == 0.0 || !determinant.is_finite() {
         return Err(given
             .at
             .error(format!("to_world has no inverse: the determinant of its upper 3 x 3 part is {determinant}")));
     }
-    Ok(given.value)
+    Ok(*outer * given.value)
 }
 
 /// Whether a transform turns left hands into right ones.
-fn mirrors(to_world: &DMat4) -> bool {
+pub(super) fn mirrors(to_world: &DMat4) -> bool {
     DMat3::from_mat4(*to_world).determinant() < 0.0
 }
 
-fn sphere(props: &Props, flip: bool) -> Result<Outline, SceneError> {
+fn sphere(props: &Props, flip: bool, outer: &DMat4) -> Result<Outline, SceneError> {
     const TOLERANCE: f64 = 1e-6;
     let center = props.vector("center")?.map_or(DVec3::ZERO, |given| given.value);
     let radius = match props.float("radius")? {
@@ -131,14 +196,14 @@ fn sphere(props: &Props, flip: bool) -> Result<Outline, SceneError> {
         Some(given) => given.value,
         None => 1.0,
     };
-    let to_world = to_world(props)?;
+    let to_world = to_world(props, outer)?;
     let linear = DMat3::from_mat4(to_world);
     let scale = linear.determinant().abs().cbrt();
     let gram = linear.transpose() * linear * (scale * scale).recip();
     if !gram.abs_diff_eq(DMat3::IDENTITY, TOLERANCE) {
-        let at = props.transform("to_world")?.map(|given| given.at.clone());
-        let at = at.expect("the identity, which a missing to_world is, is uniform");
-        return Err(at.error("a sphere cannot be scaled non-uniformly; use the same factor for x, y and z"));
+        let own = props.transform("to_world")?.map(|given| given.at);
+        let text = "a sphere cannot be scaled non-uniformly; use the same factor for x, y and z";
+        return Err(own.unwrap_or(props.at()).error(text));
     }
     let mirrored = mirrors(&to_world);
     let (center, radius) = (to_world.transform_point3(center), radius * scale);
@@ -156,10 +221,15 @@ fn sphere(props: &Props, flip: bool) -> Result<Outline, SceneError> {
     })
 }
 
-/// Rectangles and cubes keep their normals outwards however they are transformed.
-fn analytic(props: &Props, plugin: &str, flip: bool) -> Result<Outline, SceneError> {
-    let to_world = to_world(props)?;
-    let mut mesh = if plugin == "cube" { mesh::cube() } else { mesh::rectangle() };
+/// Rectangles, cubes, disks and cylinders keep their normals outwards however they are transformed.
+fn analytic(props: &Props, plugin: &str, flip: bool, outer: &DMat4) -> Result<Outline, SceneError> {
+    let to_world = to_world(props, outer)?;
+    let mut mesh = match plugin {
+        "cube" => mesh::cube(),
+        "disk" => mesh::disk(),
+        "cylinder" => cylinder(props)?,
+        _ => mesh::rectangle(),
+    };
     mesh.transform(&to_world);
     let mirrored = mirrors(&to_world);
     if flip != mirrored {
@@ -179,76 +249,18 @@ fn analytic(props: &Props, plugin: &str, flip: bool) -> Result<Outline, SceneErr
     })
 }
 
-fn triangles<'a>(
-    context: &mut Context<'a>,
-    child: Child<'a>,
-    props: &Props<'a>,
-    flip: bool,
-) -> Result<Outline, SceneError> {
-    let at = &child.object.at;
-    let filename = props
-        .string("filename")?
-        .ok_or_else(|| at.error("<shape type=\"obj\"> needs <string name=\"filename\" value=\"…\"/>"))?;
-    let face_normals = props.boolean("face_normals")?.is_some_and(|given| given.value);
-    let flip_uvs = props.boolean("flip_tex_coords")?.is_none_or(|given| given.value);
-    let to_world = to_world(props)?;
-
-    let path = source::find(&filename.value, child.object.folders.iter());
-    let shown = path.display().to_string();
-    let bytes =
-        std::fs::read(&path).map_err(|cause| filename.at.error(format!("cannot read the mesh {shown}: {cause}")))?;
-    let read = obj::parse(&bytes).map_err(|error| SceneError::Asset {
-        file: shown.clone(),
-        line: error.line,
-        col: error.col,
-        message: error.message,
-        used_at: filename.at.to_string(),
-    })?;
-    let mut mesh: Mesh = read.mesh;
-    if mesh.triangles.is_empty() {
-        return Err(filename.at.error(format!("the mesh {shown} has no faces")));
+fn cylinder(props: &Props) -> Result<crate::scene::Mesh, SceneError> {
+    let (p0, p1, radius) = (props.vector("p0")?, props.vector("p1")?, props.float("radius")?);
+    let at = [&p0, &p1].into_iter().flatten().next().map_or(props.at(), |given| given.at);
+    let p0 = p0.map_or(DVec3::ZERO, |given| given.value);
+    let p1 = p1.map_or(DVec3::Z, |given| given.value);
+    if !((p1 - p0).length() > 0.0 && (p1 - p0).is_finite()) {
+        return Err(at.error(format!("p0 is {p0} and p1 {p1}; they must be different points")));
     }
-    let total = mesh.triangles.len();
-    mesh.transform(&to_world);
-    if let Some(vertex) = mesh.positions.iter().position(|p| !p.is_finite()) {
-        let p = mesh.positions[vertex];
-        return Err(at.error(format!("the mesh {shown} overflows: to_world moves a vertex to {p}")));
+    match radius {
+        Some(given) if given.value <= 0.0 => {
+            Err(given.at.error(format!("radius is {}; it must be greater than 0", given.value)))
+        }
+        radius => Ok(mesh::cylinder(p0, p1, radius.map_or(1.0, |given| given.value))),
     }
-    let dropped = mesh.drop_degenerate();
-    if flip {
-        mesh.flip();
-    }
-    let empty = mesh.triangles.is_empty();
-    if empty {
-        let text = format!("all {total} triangles of the mesh {shown} have no area; the shape is left out");
-        context.warnings.push(filename.at.warning(text));
-    } else if dropped > 0 {
-        let text = format!("{dropped} of {total} triangles of the mesh {shown} have no area and are left out");
-        context.warnings.push(filename.at.warning(text));
-    }
-    if read.missing_uvs > 0 {
-        let text = format!(
-            "{} vertices of the mesh {shown} have no texture coordinates; they get those of a corner of the image",
-            read.missing_uvs
-        );
-        context.warnings.push(filename.at.warning(text));
-    }
-    if flip_uvs {
-        mesh.uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);
-    }
-    if !face_normals {
-        mesh.complete_normals();
-    }
-    if face_normals || mesh.is_flat() {
-        mesh.normals.clear();
-    }
-    Ok(Outline {
-        geometry: (!empty).then_some(Geometry::Mesh(mesh)),
-        name: filename.value,
-        turned: false,
-        mirrored: mirrors(&to_world).then_some(
-            "to_world mirrors this mesh, which turns its normals around, as in Mitsuba; use flip_normals to turn them \
-             back",
-        ),
-    })
 }

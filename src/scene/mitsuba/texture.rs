@@ -10,7 +10,7 @@ use super::source;
 use crate::scene::error::Location;
 use crate::scene::{Bitmap, Filter, SceneError, Texture, Wrap, bitmap};
 
-const TYPES: [&str; 2] = ["bitmap", "checkerboard"];
+pub(super) const TYPES: [&str; 2] = ["bitmap", "checkerboard"];
 
 /// A reflectance or another factor that must lie in \[0, 1\], constant or textured.
 pub(super) fn fraction<'a>(
@@ -97,7 +97,7 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
         }
         "checkerboard" => {
             let color = |name, default| {
-                Ok::<DVec3, SceneError>(props.color(name)?.map_or(DVec3::splat(default), |given| given.value))
+                Ok::<DVec3, SceneError>(props.fraction(name)?.map_or(DVec3::splat(default), |given| given.value))
             };
             let (color0, color1) = (color("color0", 0.4)?, color("color1", 0.2)?);
             let to_uv = to_uv(&props)?;

@@ -1,5 +1,6 @@
 //! A scene file as a tree of objects and their properties, before anybody asks what they mean.
 
+use std::cell::RefCell;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,6 +16,20 @@ pub(super) type ObjectId = usize;
 #[derive(Debug, Default)]
 pub(super) struct Tree {
     pub objects: Vec<Object>,
+    /// What there is to say about values.
+    warnings: RefCell<Vec<String>>,
+}
+
+impl Tree {
+    /// Says something about a value as it is looked at.
+    pub fn warn(&self, warning: String) {
+        self.warnings.borrow_mut().push(warning);
+    }
+
+    /// What was said.
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.borrow().clone()
+    }
 }
 
 /// An element with a `type`: a plugin of Mitsuba.
@@ -60,6 +75,8 @@ pub(super) enum Value {
     Rgb(DVec3),
     /// `<spectrum>` with one value for all wavelengths.
     Spectrum(f64),
+    /// `<spectrum>` with wavelengths in nm, ascending, and values.
+    Samples(Vec<(f64, f64)>),
     /// `<vector>` or `<point>`.
     Vector(DVec3),
     Transform(DMat4),
@@ -78,7 +95,7 @@ impl Value {
             Value::Float(_) => "float",
             Value::String(_) => "string",
             Value::Rgb(_) => "rgb",
-            Value::Spectrum(_) => "spectrum",
+            Value::Spectrum(_) | Value::Samples(_) => "spectrum",
             Value::Vector(_) => "vector",
             Value::Transform(_) => "transform",
             Value::Object(_) => "object",
@@ -103,10 +120,12 @@ pub(super) enum Kind {
     Phase,
     Texture,
     Volume,
+    /// A `<spectrum>` with a `type`; those without are values.
+    Spectrum,
 }
 
 impl Kind {
-    const ALL: [(Kind, &'static str); 13] = [
+    const ALL: [(Kind, &'static str); 14] = [
         (Kind::Scene, "scene"),
         (Kind::Integrator, "integrator"),
         (Kind::Sensor, "sensor"),
@@ -120,6 +139,7 @@ impl Kind {
         (Kind::Phase, "phase"),
         (Kind::Texture, "texture"),
         (Kind::Volume, "volume"),
+        (Kind::Spectrum, "spectrum"),
     ];
 
     /// The kind that a tag stands for.
@@ -127,9 +147,9 @@ impl Kind {
         Kind::ALL.iter().find(|(_, name)| *name == tag).map(|(kind, _)| *kind)
     }
 
-    /// All tags that make an object.
+    /// All tags that make an object, but for `spectrum`, which need not.
     pub fn tags() -> impl Iterator<Item = &'static str> {
-        Kind::ALL.iter().map(|(_, name)| *name)
+        Kind::ALL.iter().filter(|(kind, _)| *kind != Kind::Spectrum).map(|(_, name)| *name)
     }
 }
 

@@ -12,7 +12,7 @@ use super::params::Parameters;
 use super::source::{Source, find, read_text};
 use super::suggest::{did_you_mean, list};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
-use super::{transform, values};
+use super::{spectrum, transform, values};
 use crate::scene::SceneError;
 
 /// Deepest nesting of objects, and of files that include each other. Real scenes need about five levels; the limit
@@ -123,7 +123,8 @@ impl Reader {
         depth: usize,
     ) -> Result<(), SceneError> {
         let tag = element.tag.as_str();
-        if let Some(kind) = Kind::from_tag(tag) {
+        let plain = |kind: &Kind| *kind == Kind::Spectrum && element.attribute("type").is_none();
+        if let Some(kind) = Kind::from_tag(tag).filter(|kind| !plain(kind)) {
             if kind == Kind::Scene {
                 return Err(element.at.error("<scene> can only be the root of a file"));
             }
@@ -230,10 +231,9 @@ impl Reader {
                 let vector = transform::xyz(&|name: &str| element.get(name), 0.0);
                 Value::Vector(vector.map_err(|message| element.at.error(message))?)
             }
-            "spectrum" if element.attribute("type").is_some() || element.attribute("filename").is_some() => {
-                return Err(element.at.error(
-                    "only a <spectrum> with one value for all wavelengths is supported; give colours as <rgb>",
-                ));
+            "spectrum" if element.attribute("filename").is_some() => {
+                element.allow(&["name", "filename"])?;
+                Value::Samples(self.spectrum_file(element)?)
             }
             _ => {
                 element.allow(&["name", "value"])?;
@@ -244,8 +244,11 @@ impl Reader {
                     "float" => values::float(&text.value).map(Value::Float),
                     "string" => Ok(Value::String(text.value.clone())),
                     "rgb" => values::rgb(&text.value).map(Value::Rgb),
+                    _ if text.value.contains(':') => spectrum::samples(&text.value).map(Value::Samples),
                     _ => values::float(&text.value).map(Value::Spectrum).map_err(|message| {
-                        format!("{message}; only a <spectrum> with one value for all wavelengths is supported")
+                        format!(
+                            "{message}; a <spectrum> is one number for all wavelengths, or like \"400:0.1, 500:0.2\""
+                        )
                     }),
                 };
                 parsed.map_err(|message| text.at.error(message))?
@@ -253,6 +256,24 @@ impl Reader {
         };
         let name = values::snake_case(&element.required("name")?.value);
         self.add(parent, Property { name: Some(name), at: element.at.clone(), value })
+    }
+
+    /// The samples in the file that a `<spectrum>` names.
+    fn spectrum_file(&self, element: &Element) -> Result<Vec<(f64, f64)>, SceneError> {
+        let filename = element.required("filename")?;
+        let path = find(&filename.value, self.folders.iter().rev());
+        let shown = path.display().to_string();
+        let unreadable =
+            |cause: &dyn std::fmt::Display| filename.at.error(format!("cannot read the spectrum {shown}: {cause}"));
+        let bytes = std::fs::read(&path).map_err(|cause| unreadable(&cause))?;
+        let text = std::str::from_utf8(&bytes).map_err(|cause| unreadable(&cause))?;
+        spectrum::file(text).map_err(|(line, message)| SceneError::Asset {
+            file: shown.clone(),
+            line,
+            col: 1,
+            message,
+            used_at: filename.at.to_string(),
+        })
     }
 
     fn transform(&mut self, source: &Source, element: &Element) -> Result<DMat4, SceneError> {

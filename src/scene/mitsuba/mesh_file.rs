@@ -1,0 +1,125 @@
+//! Shapes from mesh files: `obj`, `ply` and `serialized`.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::DMat4;
+
+use super::build::Context;
+use super::props::{Child, Given, Props};
+use super::shape::{Outline, mirrors, to_world};
+use super::source;
+use crate::scene::mesh::{FileMesh, obj, ply, serialized};
+use crate::scene::{Geometry, SceneError};
+
+/// A mesh file, and which of the meshes in it.
+pub(super) type MeshKey = (PathBuf, &'static str, u64);
+
+/// Reads the file, unless another shape has done so.
+fn read<'a>(
+    context: &mut Context<'a>,
+    plugin: &str,
+    path: PathBuf,
+    filename: &Given<'a, String>,
+    shape_index: u64,
+) -> Result<Arc<FileMesh>, SceneError> {
+    let format = ["obj", "ply"].into_iter().find(|name| *name == plugin).unwrap_or("serialized");
+    let key = (path, format, shape_index);
+    if let Some(mesh) = context.meshes.get(&key) {
+        return Ok(mesh.clone());
+    }
+    let shown = key.0.display().to_string();
+    let bytes =
+        std::fs::read(&key.0).map_err(|cause| filename.at.error(format!("cannot read the mesh {shown}: {cause}")))?;
+    let in_file = |text: String| filename.at.error(format!("cannot read the mesh {shown}: {text}"));
+    let mesh = match format {
+        "obj" => obj::parse(&bytes).map(|obj| FileMesh { mesh: obj.mesh, missing_uvs: obj.missing_uvs }).map_err(
+            |error| SceneError::Asset {
+                file: shown.clone(),
+                line: error.line,
+                col: error.col,
+                message: error.message,
+                used_at: filename.at.to_string(),
+            },
+        )?,
+        "ply" => ply::parse(&bytes).map_err(in_file)?,
+        _ => serialized::parse(&bytes, shape_index).map_err(in_file)?,
+    };
+    let mesh = Arc::new(mesh);
+    context.meshes.insert(key, mesh.clone());
+    Ok(mesh)
+}
+
+/// The mesh of a shape in world space.
+pub(super) fn outline<'a>(
+    context: &mut Context<'a>,
+    child: Child<'a>,
+    props: &Props<'a>,
+    flip: bool,
+    outer: &DMat4,
+) -> Result<Outline, SceneError> {
+    let (at, plugin) = (&child.object.at, child.object.plugin.as_str());
+    let filename = props
+        .string("filename")?
+        .ok_or_else(|| at.error(format!("<shape type=\"{plugin}\"> needs <string name=\"filename\" value=\"…\"/>")))?;
+    let face_normals = props.boolean("face_normals")?.is_some_and(|given| given.value);
+    // OBJ files have (0, 0) at the lower left of an image; Mitsuba takes it that the others do not.
+    let flip_uvs = props.boolean("flip_tex_coords")?.map_or(plugin == "obj", |given| given.value);
+    let shape_index = match props.integer_if("shape_index", plugin == "serialized")? {
+        None => 0,
+        Some(given) => u64::try_from(given.value)
+            .map_err(|_| given.at.error(format!("shape_index is {}; it must not be negative", given.value)))?,
+    };
+    let to_world = to_world(props, outer)?;
+
+    let path = source::find(&filename.value, child.object.folders.iter());
+    let shown = path.display().to_string();
+    let read = read(context, plugin, path, &filename, shape_index)?;
+    let mut mesh = read.mesh.clone();
+    if mesh.triangles.is_empty() {
+        return Err(filename.at.error(format!("the mesh {shown} has no faces")));
+    }
+    let total = mesh.triangles.len();
+    mesh.transform(&to_world);
+    if let Some(vertex) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        let p = mesh.positions[vertex];
+        return Err(at.error(format!("the mesh {shown} overflows: to_world moves a vertex to {p}")));
+    }
+    let dropped = mesh.drop_degenerate();
+    if flip {
+        mesh.flip();
+    }
+    let empty = mesh.triangles.is_empty();
+    if empty {
+        let text = format!("all {total} triangles of the mesh {shown} have no area; the shape is left out");
+        context.warnings.push(filename.at.warning(text));
+    } else if dropped > 0 {
+        let text = format!("{dropped} of {total} triangles of the mesh {shown} have no area and are left out");
+        context.warnings.push(filename.at.warning(text));
+    }
+    if read.missing_uvs > 0 {
+        let text = format!(
+            "{} vertices of the mesh {shown} have no texture coordinates; they get those of a corner of the image",
+            read.missing_uvs
+        );
+        context.warnings.push(filename.at.warning(text));
+    }
+    if flip_uvs {
+        mesh.uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);
+    }
+    if !face_normals {
+        mesh.complete_normals();
+    }
+    if face_normals || mesh.is_flat() {
+        mesh.normals.clear();
+    }
+    Ok(Outline {
+        geometry: (!empty).then_some(Geometry::Mesh(mesh)),
+        name: filename.value,
+        turned: false,
+        mirrored: mirrors(&to_world).then_some(
+            "to_world mirrors this mesh, which turns its normals around, as in Mitsuba; use flip_normals to turn them \
+             back",
+        ),
+    })
+}

@@ -1,0 +1,81 @@
+//! Which plugins of Mitsuba 3 there are: those that are supported, and what to use instead of those that are not.
+
+use super::tree::{Kind, Object};
+use super::{bsdf, emitter, film, integrator, medium, sensor, shape, spectrum, texture};
+
+/// The supported plugins of each kind of element, in the order of the documentation.
+pub(super) const SUPPORTED: [(Kind, &[&str]); 12] = [
+    (Kind::Integrator, &integrator::TYPES),
+    (Kind::Sensor, &sensor::TYPES),
+    (Kind::Film, &film::FILM_TYPES),
+    (Kind::Sampler, &film::SAMPLER_TYPES),
+    (Kind::Rfilter, &film::FILTER_TYPES),
+    (Kind::Medium, &medium::TYPES),
+    (Kind::Phase, &medium::PHASE_TYPES),
+    (Kind::Shape, &shape::TYPES),
+    (Kind::Bsdf, &bsdf::TYPES),
+    (Kind::Texture, &texture::TYPES),
+    (Kind::Spectrum, &spectrum::TYPES),
+    (Kind::Emitter, &emitter::TYPES),
+];
+
+/// Plugins of Mitsuba 3.9 that are not supported, and what to use instead. An entry of a plugin that is supported has no
+/// effect.
+pub(super) const REFUSED: [(Kind, &str, &str); 42] = [
+    (Kind::Integrator, "ptracer", "use \"volpath\": light is not traced from the emitters here"),
+    (Kind::Integrator, "depth", "use \"volpath\": only radiance is rendered"),
+    (Kind::Integrator, "stokes", "use \"volpath\": light is not polarised here"),
+    (Kind::Integrator, "prb", "use \"path\": nothing is differentiated here"),
+    (Kind::Integrator, "prbvolpath", "use \"volpath\": nothing is differentiated here"),
+    (Kind::Sensor, "thinlens", "use \"perspective\": cameras have no lens"),
+    (Kind::Sensor, "orthographic", "use \"perspective\" with a small fov from far away"),
+    (Kind::Sensor, "radiancemeter", "use \"perspective\" with a small fov"),
+    (Kind::Sensor, "irradiancemeter", "use \"perspective\", which sees a diffuse surface there"),
+    (Kind::Sensor, "distant", "use \"perspective\" with a small fov from far away"),
+    (Kind::Sensor, "batch", "use one scene file for each camera"),
+    (Kind::Film, "specfilm", "use \"hdrfilm\": light has three channels here"),
+    (Kind::Medium, "heterogeneous", "use \"homogeneous\" in nested boundaries"),
+    (Kind::Phase, "sggx", "use \"hg\" or \"tabphase\""),
+    (Kind::Shape, "bsplinecurve", "convert it to a mesh file (obj or ply)"),
+    (Kind::Shape, "linearcurve", "convert it to a mesh file (obj or ply)"),
+    (Kind::Shape, "ellipsoids", "use \"sphere\", or a mesh file"),
+    (Kind::Shape, "ellipsoidsmesh", "use a mesh file (obj or ply)"),
+    (Kind::Shape, "sdfgrid", "convert it to a mesh file (obj or ply)"),
+    (Kind::Shape, "merge", "put its shapes directly into the scene"),
+    (
+        Kind::Bsdf,
+        "blendbsdf",
+        "use the one of its two BSDFs that matters more, or \"mask\" where one of them is \"null\"",
+    ),
+    (Kind::Bsdf, "bumpmap", "use the BSDF inside, with the bumps in the mesh"),
+    (Kind::Bsdf, "normalmap", "use the BSDF inside, with the normals in the mesh"),
+    (
+        Kind::Bsdf,
+        "principled",
+        "use \"roughplastic\" for what is painted, \"roughconductor\" for metal, \"roughdielectric\" for glass",
+    ),
+    (Kind::Bsdf, "principledthin", "use \"thindielectric\" or \"diffuse\""),
+    (Kind::Bsdf, "pplastic", "use \"plastic\" or \"roughplastic\": light is not polarised here"),
+    (Kind::Bsdf, "measured", "use \"roughconductor\" or \"roughplastic\""),
+    (Kind::Bsdf, "measured_polarized", "use \"roughconductor\" or \"roughplastic\": light is not polarised here"),
+    (Kind::Bsdf, "hair", "use \"roughplastic\" on a mesh"),
+    (Kind::Bsdf, "polarizer", "leave it out: light is not polarised here"),
+    (Kind::Bsdf, "retarder", "leave it out: light is not polarised here"),
+    (Kind::Bsdf, "circular", "leave it out: light is not polarised here"),
+    (Kind::Texture, "mesh_attribute", "use \"bitmap\" with texture coordinates"),
+    (Kind::Texture, "volume", "use \"bitmap\""),
+    (Kind::Spectrum, "srgb", "use <rgb>"),
+    (Kind::Spectrum, "rawconstant", "use <rgb>"),
+    (Kind::Emitter, "projector", "use \"spot\""),
+    (Kind::Emitter, "directionalarea", "use \"area\" far away, or \"directional\""),
+    (Kind::Emitter, "sunsky", "render the sky to an image for \"envmap\""),
+    (Kind::Emitter, "timed_sunsky", "render the sky to an image for \"envmap\""),
+    (Kind::Volume, "constvolume", "use the property of the medium itself"),
+    (Kind::Volume, "gridvolume", "use a \"homogeneous\" medium"),
+];
+
+/// What to use instead of a plugin, as the middle of an error message.
+pub(super) fn instead(object: &Object) -> String {
+    let found = REFUSED.iter().find(|(kind, plugin, _)| *kind == object.kind && *plugin == object.plugin);
+    found.map_or(String::new(), |(_, _, advice)| format!("; {advice}"))
+}
