@@ -7,7 +7,7 @@ use common::statistics::mean_and_error;
 use common::{device, images, scenes};
 use glam::{DMat4, DVec3};
 use tyndall::gpu::shader::Variant;
-use tyndall::scene::{Camera, Film, Shape};
+use tyndall::scene::{Camera, Film, Light, Scene, Shape};
 
 #[test]
 fn device_and_reference_follow_the_same_paths() {
@@ -108,5 +108,21 @@ fn a_medium_that_absorbs_nothing_is_invisible_in_a_furnace() {
         eprintln!("{name}: {result}");
         let darker: Vec<f64> = batches.iter().map(|batch| batch * 0.98).collect();
         check_furnace(&darker).expect_err("a furnace that loses 2 %");
+    }
+}
+
+#[test]
+fn a_scene_without_surfaces_renders() {
+    // Rays of all octants, through a tree in which there is nothing to be found. The first scattering of light of intensity 1
+    // from the place of the camera itself would be infinite; the light is a little off.
+    for target in [v(1.0, 2.0, 3.0), v(-1.0, 2.0, -3.0), v(1.0, -2.0, -3.0), v(-1.0, -2.0, 3.0)] {
+        let mut scene = Scene::new(Camera::look_at(DVec3::ZERO, target, DVec3::Y, 100.0), Film::new(8, 8));
+        scene.camera.medium = Some(scene.add_medium(scenes::gray(0.5, 0.5, 0.0)));
+        scene.lights.push(Light::Point { position: v(0.0, 4.0, 0.0), intensity: DVec3::ONE });
+        scene.integrator.max_depth = Some(2);
+        let packed = scenes::pack(&scene, 1);
+        let (device, reference) = (images::on_device(&packed, 16), images::by_reference(&packed, 16));
+        images::compare(&device, &reference).expect("both render the same");
+        assert!(images::average(&device).min_element() > 0.0, "fog scatters light");
     }
 }

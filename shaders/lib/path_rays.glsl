@@ -19,7 +19,7 @@ vec3 depth_at_infinity(Path path) {
 Hit begin_hit(Path path) {
     // Extension rays see a little beyond their flight: see flight_point().
     float t_max = HAS_MEDIA && !path.shadow ? path.t_max + near_distance(path, path.t_max) : path.t_max;
-    Hit hit = Hit(t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false, 0u);
+    Hit hit = Hit(t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false, 0u, 1.0);
     if (HAS_MEDIA && HAS_LIGHT_SAMPLING && path.shadow) {
         uint medium = HAS_DIELECTRIC ? path.light_medium : path.medium;
         vec3 tau = MEDIUM(valid_medium(medium)).sigma_t * shadow_length(path) + depth_at_infinity(path);

@@ -109,9 +109,9 @@ impl Bvh {
 
     /// A tree that no ray hits.
     fn empty() -> Bvh {
-        // An inner node whose near bounds lie behind its far bounds.
+        // For each octant an inner node whose near bounds lie behind its far bounds, and whose link leads behind it.
         Bvh {
-            nodes: vec![[0xffff, 0xffff, 0xffff, 1]; 8],
+            nodes: (1..=8).map(|end| [0xffff, 0xffff, 0xffff, end]).collect(),
             node_count: 1,
             copies: 8,
             grid_origin: Vec3::ZERO,
