@@ -110,7 +110,8 @@ fn glowing_balls_that_scatter_agree_with_the_table() {
 #[test]
 fn glowing_slabs_agree_with_the_table() {
     let mut verdict = Verdict::default();
-    let slabs = truth::table("A2").into_iter().filter(|row| row.has("L_emit") && row.number("n") == 1.0);
+    let emits = |row: &truth::Row| row.has("L_emit") && row.number("n") == 1.0 && row.number("albedo") < 1.0;
+    let slabs = truth::table("A2").into_iter().filter(emits);
     for row in slabs {
         let (tau, albedo, g) = (row.number("tau"), row.number("albedo"), row.number("g"));
         let width = 12.0 * tau + 40.0 / (1.0 - g) + 20.0;
