@@ -207,28 +207,26 @@ fn push_constants_begin_with_the_addresses() {
 }
 
 #[test]
-fn both_forms_of_every_kernel_render_the_same_image() {
+fn both_forms_of_a_kernel_render_the_same_image() {
     let device = device();
     let mut rendered = 0;
-    for (name, scene) in scenes::all() {
+    // As descriptors, lavapipe's compiler takes minutes for kernels that can do much, and no device of today needs that form: a
+    // few scenes stand for all. Every kernel is compiled and validated in both forms above.
+    let scenes = scenes::all().into_iter().filter(|(name, _)| ["gray box", "furnace", "glow"].contains(name));
+    for (name, scene) in scenes {
         let packed = scenes::pack(&scene, 3);
-        let mut forms = vec![(packed.clone(), packed.features)];
-        // Compiling takes longer than rendering: one scene stands for the kernels that can do everything, one for trees
-        // too large for eight copies.
-        if name == "nested media" {
-            forms.push((packed.clone(), packed.features.everything()));
-        }
+        let mut forms = vec![packed.clone()];
         if name == "gray box" {
+            // A tree too large for eight copies.
             let mut single = packed;
             single.bvh.nodes.truncate(single.bvh.node_count as usize);
             single.bvh.copies = 1;
             single.features.node_copies = 1;
-            let features = single.features;
-            forms.push((single, features));
+            forms.push(single);
         }
-        for (packed, features) in &forms {
-            let variant =
-                |buffer_reference| Variant { features: *features, workgroup: device.subgroup_size, buffer_reference };
+        for packed in &forms {
+            let features = packed.features;
+            let variant = |buffer_reference| Variant { features, workgroup: device.subgroup_size, buffer_reference };
             let descriptors = images::with_variant(packed, 16, &variant(false));
             assert!(images::average(&images::mean(&descriptors)).min_element() > 0.0, "{name} is black");
             if device.buffer_reference {
@@ -238,7 +236,7 @@ fn both_forms_of_every_kernel_render_the_same_image() {
             rendered += 1;
         }
     }
-    assert_eq!(rendered, scenes::all().len() + 2);
+    assert_eq!(rendered, 4);
 }
 
 #[test]
