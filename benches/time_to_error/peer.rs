@@ -37,7 +37,7 @@ pub struct Configuration {
     variant: String,
     integrator: &'static str,
     sampler: &'static str,
-    /// Lights are sampled in media and at surfaces; without, paths find them by chance.
+    /// Lights are sampled in media; without, paths that scatter there find them by chance.
     sample_emitters: bool,
 }
 
