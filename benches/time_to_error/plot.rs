@@ -9,7 +9,7 @@ use super::results::{Clock, Measure, Summary};
 /// Panels in a row.
 const COLUMNS: usize = 3;
 /// Width and height of a panel, in pixels.
-const PANEL: (u32, u32) = (340, 280);
+const PANEL: (u32, u32) = (400, 320);
 /// Tyndall, the other's strongest configuration, and the rest of them.
 const COLOURS: [RGBColor; 3] = [RGBColor(0, 90, 181), RGBColor(220, 50, 32), RGBColor(190, 190, 190)];
 
@@ -61,7 +61,7 @@ fn panel(
     if all_points().next().is_none() {
         // The reference is noisier than everything that was measured.
         return area
-            .titled(&format!("{scene}: no error above that of the reference"), ("sans-serif", 12))
+            .titled(&format!("{scene}: no error above that of the reference"), ("sans-serif", 14))
             .map(drop)
             .map_err(failed);
     }
@@ -70,20 +70,22 @@ fn panel(
         0.7 * low..high * 1.4
     };
     let mut chart = ChartBuilder::on(area)
-        .caption(scene, ("sans-serif", 15))
+        .caption(scene, ("sans-serif", 19))
         .margin(8)
-        .x_label_area_size(36)
-        .y_label_area_size(56)
+        .x_label_area_size(40)
+        .y_label_area_size(62)
         .build_cartesian_2d(range(|point| point.0).log_scale(), range(|point| point.1).log_scale())
         .map_err(failed)?;
     chart
         .configure_mesh()
         .x_desc("CPU seconds")
         .y_desc("relMSE")
-        .x_label_formatter(&|value| format!("{value:.0e}"))
-        .y_label_formatter(&|value| format!("{value:.0e}"))
+        .x_labels(6)
+        .y_labels(8)
+        .x_label_formatter(&|value| axis_label(*value))
+        .y_label_formatter(&|value| axis_label(*value))
         .light_line_style(TRANSPARENT)
-        .label_style(("sans-serif", 11))
+        .label_style(("sans-serif", 14))
         .draw()
         .map_err(failed)?;
     for Curve { points, colour, label } in curves {
@@ -97,7 +99,7 @@ fn panel(
         .configure_series_labels()
         .position(SeriesLabelPosition::LowerLeft)
         .background_style(WHITE.mix(0.8))
-        .label_font(("sans-serif", 10))
+        .label_font(("sans-serif", 13))
         .draw()
         .map_err(failed)
 }
@@ -112,6 +114,16 @@ fn curve(summary: &Summary, strongest: bool) -> Curve {
         (false, false) => (COLOURS[2], None),
     };
     Curve { points: points.collect(), colour, label }
+}
+
+/// "0.05", "20" or, where that would be long, "5e-4".
+fn axis_label(value: f64) -> String {
+    let one_digit = format!("{value:.0e}");
+    if (1e-2..1e4).contains(&value) {
+        one_digit.parse::<f64>().map_or(one_digit, |rounded| rounded.to_string())
+    } else {
+        one_digit
+    }
 }
 
 fn failed(error: impl std::fmt::Display) -> BenchError {
