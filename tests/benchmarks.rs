@@ -12,6 +12,8 @@ use results::{Clock, Measure, OwnError, Record, Summary, Time, summarize};
 
 const OWN: OwnError = OwnError { rel_mse: 1e-4, trimmed_rel_mse: Some(5e-5), mse: 2e-4 };
 
+const RELMSE: (Measure, Clock) = (Measure::RelMse, Clock::Cpu);
+
 /// A renderer whose relMSE is `error` / spp and which takes `seconds` for a sample of each pixel. The reference's own error is
 /// in what it measures, as in reality; MSE is twice and trimmed relMSE half of relMSE.
 fn records(renderer: &'static str, configuration: &str, error: f64, seconds: f64) -> Vec<Record> {
@@ -80,7 +82,7 @@ fn the_strongest_configuration_is_compared() {
     measured.extend(records("Mitsuba", "slow", 0.2, 0.5));
     let all = summarize(&measured);
     let ours = of(&all, "default");
-    let (peer, ratio) = ours.strongest(&all, Measure::RelMse, Clock::Cpu).expect("there are three");
+    let (peer, ratio) = ours.strongest(&all, RELMSE, |ratio| ratio.value).expect("there are three");
     assert_eq!(peer.configuration, "strong");
     assert!(close(Some(ratio.value), 0.03 / 0.02), "{ratio:?}");
     assert_eq!(ratio.budgets, 3);
@@ -92,9 +94,36 @@ fn the_strongest_configuration_is_compared() {
         let mut worse = records("Tyndall", "default", error, seconds);
         worse.extend(records("Mitsuba", "strong", 0.3, 0.1));
         let all = summarize(&worse);
-        let (_, ratio) = of(&all, "default").strongest(&all, Measure::RelMse, Clock::Cpu).expect("there is one");
+        let (_, ratio) = of(&all, "default").strongest(&all, RELMSE, |ratio| ratio.value).expect("there is one");
         assert!(close(Some(ratio.value), 0.03 / 0.04), "{ratio:?}");
     }
+}
+
+#[test]
+fn a_fixed_cost_counts_least_at_the_largest_budget() {
+    let mut measured = records("Tyndall", "default", 0.4, 0.05);
+    let mut with_cost = records("Mitsuba", "fixed cost", 0.4, 0.05);
+    with_cost.iter_mut().for_each(|record| record.time.cpu += 0.2);
+    measured.extend(with_cost);
+    measured.extend(records("Mitsuba", "without", 0.6, 0.05));
+    let all = summarize(&measured);
+    let ours = of(&all, "default");
+    // (.05 spp + .2) / (.05 spp): 2, 1.25 and 1.0625.
+    let ratio = ours.ratio(&of(&all, "fixed cost"), Measure::RelMse, Clock::Cpu).expect("all budgets count");
+    assert!(
+        close(Some(ratio.at_largest), 1.0625) && close(Some(ratio.value.powi(3)), 2.0 * 1.25 * 1.0625),
+        "{ratio:?}"
+    );
+    // Against an error of .6 it is the stronger one by either number; against .5, 1.25 times ours, by one of them alone.
+    let strongest = |all: &[Summary], by| ours.strongest(all, RELMSE, by).map(|(peer, _)| peer.configuration.clone());
+    assert_eq!(strongest(&all, |ratio| ratio.value).as_deref(), Some("fixed cost"));
+    let mut measured = records("Mitsuba", "without", 0.5, 0.05);
+    let mut with_cost = records("Mitsuba", "fixed cost", 0.4, 0.05);
+    with_cost.iter_mut().for_each(|record| record.time.cpu += 0.2);
+    measured.extend(with_cost);
+    let all = summarize(&measured);
+    assert_eq!(strongest(&all, |ratio| ratio.value).as_deref(), Some("without"));
+    assert_eq!(strongest(&all, |ratio| ratio.at_largest).as_deref(), Some("fixed cost"));
 }
 
 #[test]
@@ -118,7 +147,7 @@ fn errors_below_that_of_the_reference_are_not_figures() {
     converged.extend(records("Mitsuba", "strong", 0.3, 0.1));
     let all = summarize(&converged);
     assert_eq!(all[0].figure(Measure::RelMse, Clock::Cpu), None);
-    assert!(all[0].strongest(&all, Measure::RelMse, Clock::Cpu).is_none());
+    assert!(all[0].strongest(&all, RELMSE, |ratio| ratio.value).is_none());
 }
 
 #[test]
@@ -134,15 +163,15 @@ fn the_table_shows_what_was_measured() {
     };
     let table = output::markdown(&summarize(&measured), &conditions(Some("Mitsuba 3")));
     assert!(
-        table.contains("| ball | 0.0200 | strong | 0.0300 | **1.50** ± 0.12 | 1.50 | 1.50 | 1.50 | 3 |"),
+        table.contains("| ball | 0.0200 | strong | 0.0300 | **1.50** ± 0.12 | 1.50 | 1.50 | 1.50 | 1.50 | 3 |"),
         "{table}"
     );
-    assert!(table.contains("| geometric mean | | | | **1.50** | 1.50 | 1.50 | 1.50 | | | |"), "{table}");
+    assert!(table.contains("| geometric mean | | | | **1.50** | 1.50 | 1.50 | 1.50 | 1.50 | | | |"), "{table}");
     assert!(table.contains("| ball | Mitsuba weak | 0.010 | 0.020 | 3.0 | 3.0 | 0.0800 |"), "{table}");
     // All rows of a table have as many cells as its head.
     let cells: Vec<usize> =
         table.lines().filter(|line| line.starts_with('|')).map(|l| l.matches('|').count()).collect();
-    assert_eq!(cells, [12, 12, 12, 12, 12, 12, 12, 12, 12], "{table}");
+    assert_eq!(cells, [13, 13, 13, 13, 12, 12, 12, 12, 12], "{table}");
 
     let alone = output::markdown(&summarize(&records("Tyndall", "default", 0.4, 0.05)), &conditions(None));
     assert!(table.contains("strongest") && !alone.contains("strongest"), "{alone}");

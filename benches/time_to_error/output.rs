@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::results::{Clock, Measure, Record, Summary, Time, geometric_mean};
+use super::results::{Clock, Measure, Ratio, Record, Summary, Time, geometric_mean};
 
 /// What a reader has to know beside the figures.
 pub struct Conditions {
@@ -85,36 +85,39 @@ pub fn markdown(summaries: &[Summary], conditions: &Conditions) -> String {
     text
 }
 
-/// Each ratio is against what is strongest by that very measure.
+/// A column of ratios: by which measure, on which clock, and which number of the ratio.
+type Column = ((Measure, Clock), fn(&Ratio) -> f64);
+
+/// The columns; the first is the one that the configuration is named for.
+const COLUMNS: [Column; 5] = [
+    ((Measure::RelMse, Clock::Cpu), |ratio| ratio.value),
+    ((Measure::RelMse, Clock::Cpu), |ratio| ratio.at_largest),
+    ((Measure::Trimmed, Clock::Cpu), |ratio| ratio.value),
+    ((Measure::Mse, Clock::Cpu), |ratio| ratio.value),
+    ((Measure::RelMse, Clock::Wall), |ratio| ratio.value),
+];
+
+/// The table of ratios. Each is against the configuration that is strongest by that very column.
 fn ratios(text: &mut String, summaries: &[Summary]) {
-    const COLUMNS: [(Measure, Clock); 4] = [
-        (Measure::RelMse, Clock::Cpu),
-        (Measure::Trimmed, Clock::Cpu),
-        (Measure::Mse, Clock::Cpu),
-        (Measure::RelMse, Clock::Wall),
-    ];
     text.push_str(
-        "| scene | relMSE·CPU s | its strongest configuration | its relMSE·CPU s | **ratio** | trimmed | MSE | on the wall \
-         | budgets | mean z | its z |\n|---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|\n",
+        "| scene | relMSE·CPU s | its strongest configuration | its relMSE·CPU s | **ratio** | at the largest budget \
+         | trimmed | MSE | on the wall | budgets | mean z | its z |\n|---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
-    let mut columns: [Vec<f64>; 4] = Default::default();
+    let mut columns: [Vec<f64>; COLUMNS.len()] = Default::default();
     for ours in summaries.iter().filter(|summary| summary.renderer == "Tyndall") {
-        let strongest = COLUMNS.map(|(measure, clock)| ours.strongest(summaries, measure, clock));
-        for (column, strongest) in columns.iter_mut().zip(&strongest) {
-            column.extend(strongest.iter().map(|(_, ratio)| ratio.value));
+        let values = COLUMNS.map(|(what, by)| ours.strongest(summaries, what, by).map(|(_, ratio)| by(&ratio)));
+        for (column, value) in columns.iter_mut().zip(values) {
+            column.extend(value);
         }
-        let [main, others @ ..] = &strongest;
-        let Some((peer, ratio)) = main else {
-            let _ = writeln!(text, "| {} | – | nothing to compare | – | – | – | – | – | 0 | – | – |", ours.scene);
+        let (what, by) = COLUMNS[0];
+        let Some((peer, ratio)) = ours.strongest(summaries, what, by) else {
+            let _ = writeln!(text, "| {} | – | nothing to compare | – | – | – | – | – | – | 0 | – | – |", ours.scene);
             continue;
         };
-        let [trimmed, mse, wall] = others.each_ref().map(|other| match other {
-            Some((_, ratio)) => format!("{:.2}", ratio.value),
-            None => "–".to_owned(),
-        });
+        let [_, largest, trimmed, mse, wall] = values.map(quotient);
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | **{:.2}** ± {:.2} | {trimmed} | {mse} | {wall} | {} | {:+.1} | {:+.1} |",
+            "| {} | {} | {} | {} | **{:.2}** ± {:.2} | {largest} | {trimmed} | {mse} | {wall} | {} | {:+.1} | {:+.1} |",
             ours.scene,
             number(ours.figure(Measure::RelMse, Clock::Cpu)),
             peer.configuration,
@@ -126,11 +129,13 @@ fn ratios(text: &mut String, summaries: &[Summary]) {
             peer.mean_z,
         );
     }
-    let [main, trimmed, mse, wall] = columns.map(|column| match geometric_mean(column.into_iter()) {
-        Some(mean) => format!("{mean:.2}"),
-        None => "–".to_owned(),
-    });
-    let _ = writeln!(text, "| geometric mean | | | | **{main}** | {trimmed} | {mse} | {wall} | | | |\n");
+    let [main, largest, trimmed, mse, wall] = columns.map(|column| quotient(geometric_mean(column.into_iter())));
+    let _ = writeln!(text, "| geometric mean | | | | **{main}** | {largest} | {trimmed} | {mse} | {wall} | | | |\n");
+}
+
+/// Two digits behind the point, or a dash.
+fn quotient(value: Option<f64>) -> String {
+    value.map_or("–".to_owned(), |value| format!("{value:.2}"))
 }
 
 /// Three digits, or a dash.

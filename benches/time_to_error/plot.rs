@@ -51,7 +51,9 @@ fn panel(
     area: &DrawingArea<SVGBackend, Shift>,
 ) -> Result<(), BenchError> {
     let ours = of_scene.iter().find(|summary| summary.renderer == "Tyndall");
-    let strongest = ours.and_then(|ours| ours.strongest(all, Measure::RelMse, Clock::Cpu)).map(|(peer, _)| peer);
+    let strongest = ours
+        .and_then(|ours| ours.strongest(all, (Measure::RelMse, Clock::Cpu), |ratio| ratio.value))
+        .map(|(peer, _)| peer);
     let is_strongest = |summary: &Summary| strongest.is_some_and(|peer| std::ptr::eq(peer, summary));
     let mut curves: Vec<Curve> = of_scene.iter().map(|summary| curve(summary, is_strongest(summary))).collect();
     // Labelled curves last, above the others.
@@ -67,14 +69,17 @@ fn panel(
     }
     let range = |value: fn((f64, f64)) -> f64| {
         let (low, high) = all_points().map(value).fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
-        0.7 * low..high * 1.4
+        (low, high)
     };
+    let (shortest, longest) = range(|point| point.0);
+    let (smallest, largest) = range(|point| point.1);
     let mut chart = ChartBuilder::on(area)
         .caption(scene, ("sans-serif", 19))
         .margin(8)
         .x_label_area_size(40)
         .y_label_area_size(62)
-        .build_cartesian_2d(range(|point| point.0).log_scale(), range(|point| point.1).log_scale())
+        // Below the curves there is room for the legend.
+        .build_cartesian_2d((0.7 * shortest..1.4 * longest).log_scale(), (0.1 * smallest..1.4 * largest).log_scale())
         .map_err(failed)?;
     chart
         .configure_mesh()
@@ -110,7 +115,7 @@ fn curve(summary: &Summary, strongest: bool) -> Curve {
         summary.points.iter().filter_map(|point| Some((point.time.cpu, point.errors[Measure::RelMse as usize]?)));
     let (colour, label) = match (ours, strongest) {
         (true, _) => (COLOURS[0], Some("Tyndall".to_owned())),
-        (false, true) => (COLOURS[1], Some(format!("{} {}", summary.renderer, summary.configuration))),
+        (false, true) => (COLOURS[1], Some(format!("{}: {}", summary.renderer, summary.configuration))),
         (false, false) => (COLOURS[2], None),
     };
     Curve { points: points.collect(), colour, label }

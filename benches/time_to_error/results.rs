@@ -154,7 +154,9 @@ pub struct Summary {
 pub struct Ratio {
     /// Error × time of the other divided by ours: above 1, ours is better.
     pub value: f64,
-    /// Its relative standard error, from the scatter over the seeds.
+    /// The same at the largest of these budgets alone, where fixed costs of a render count least.
+    pub at_largest: f64,
+    /// Relative standard error of `value`, from the scatter over the seeds.
     pub spread: f64,
     /// Budgets that both have.
     pub budgets: usize,
@@ -248,20 +250,26 @@ impl Summary {
             })
             .collect();
         let value = geometric_mean(quotients.iter().map(|(_, quotient)| *quotient))?;
+        let (_, at_largest) = *quotients.last()?;
         let spread = |summary: &Summary| -> f64 {
             let common = |point: &&Point| quotients.iter().any(|(budget, _)| *budget == point.budget);
             summary.points.iter().filter(common).map(|point| point.spread.powi(2)).sum()
         };
         let spread = (spread(self) + spread(other)).sqrt() / quotients.len() as f64;
-        Some(Ratio { value, spread, budgets: quotients.len() })
+        Some(Ratio { value, at_largest, spread, budgets: quotients.len() })
     }
 
-    /// The strongest of the others on this scene, for this measure and clock.
-    pub fn strongest<'a>(&self, all: &'a [Summary], measure: Measure, clock: Clock) -> Option<(&'a Summary, Ratio)> {
+    /// The strongest of the others on this scene, for this measure and clock, by the number that `by` takes from the ratio.
+    pub fn strongest<'a>(
+        &self,
+        all: &'a [Summary],
+        (measure, clock): (Measure, Clock),
+        by: fn(&Ratio) -> f64,
+    ) -> Option<(&'a Summary, Ratio)> {
         all.iter()
             .filter(|other| other.scene == self.scene && other.renderer != self.renderer)
             .filter_map(|other| Some((other, self.ratio(other, measure, clock)?)))
-            .min_by(|(_, a), (_, b)| a.value.total_cmp(&b.value))
+            .min_by(|(_, a), (_, b)| by(a).total_cmp(&by(b)))
     }
 }
 
