@@ -127,6 +127,25 @@ fn a_fixed_cost_counts_least_at_the_largest_budget() {
 }
 
 #[test]
+fn a_biased_configuration_does_not_win() {
+    let mut measured = records("Mitsuba", "honest", 0.3, 0.1);
+    let mut biased = records("Mitsuba", "biased", 0.1, 0.1);
+    biased.iter_mut().for_each(|record| record.z = -5.0);
+    measured.extend(biased);
+    let mut others = measured.clone();
+    measured.extend(records("Tyndall", "default", 0.4, 0.05));
+    let all = summarize(&measured);
+    let (peer, _) = of(&all, "default").strongest(&all, RELMSE, |ratio| ratio.value).expect("one is left");
+    assert_eq!(peer.configuration, "honest");
+    // Nor are we compared if the bias is ours.
+    let mut ours = records("Tyndall", "default", 0.4, 0.05);
+    ours.iter_mut().for_each(|record| record.z = 4.5);
+    others.extend(ours);
+    let all = summarize(&others);
+    assert!(of(&all, "default").strongest(&all, RELMSE, |ratio| ratio.value).is_none());
+}
+
+#[test]
 fn errors_below_that_of_the_reference_are_not_figures() {
     // .4 / 64 is 62 times the reference's error; .004 / 64 is less than it, .004 / 16 two and a half times it.
     let all = summarize(&records("Tyndall", "default", 0.004, 0.05));
@@ -160,6 +179,7 @@ fn the_table_shows_what_was_measured() {
         peer: peer.map(str::to_owned),
         seeds: 2,
         budgets: vec!["4 spp".to_owned()],
+        failures: vec!["ball, odd: no".to_owned()],
     };
     let table = output::markdown(&summarize(&measured), &conditions(Some("Mitsuba 3")));
     assert!(
@@ -168,6 +188,7 @@ fn the_table_shows_what_was_measured() {
     );
     assert!(table.contains("| geometric mean | | | | **1.50** | 1.50 | 1.50 | 1.50 | 1.50 | | | |"), "{table}");
     assert!(table.contains("| ball | Mitsuba weak | 0.010 | 0.020 | 3.0 | 3.0 | 0.0800 |"), "{table}");
+    assert!(table.contains("Could not take part:\n\n- ball, odd: no\n") && !table.contains("**!**"), "{table}");
     // All rows of a table have as many cells as its head.
     let cells: Vec<usize> =
         table.lines().filter(|line| line.starts_with('|')).map(|l| l.matches('|').count()).collect();

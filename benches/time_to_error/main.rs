@@ -63,14 +63,22 @@ fn run(arguments: &Arguments) -> Result<(), BenchError> {
         None => None,
     };
 
-    let mut records = Vec::new();
+    let mut results = Results::default();
     for scene in &scenes {
         let case = Case::load(scene, arguments)?;
-        measure(&case, &device, mitsuba.as_ref(), arguments, &mut records)?;
+        measure(&case, &device, mitsuba.as_ref(), arguments, &mut results)?;
         // What was measured is kept, even if a later scene fails.
-        publish(&records, &device, mitsuba.as_ref(), arguments)?;
+        publish(&results, &device, mitsuba.as_ref(), arguments)?;
     }
     Ok(())
+}
+
+/// What has been measured so far.
+#[derive(Default)]
+struct Results {
+    records: Vec<Record>,
+    /// What the other renderer could not do, one a line.
+    failures: Vec<String>,
 }
 
 /// Measures one scene. The renderers take turns, seed by seed, so that whatever else the machine does meets all of them.
@@ -79,7 +87,7 @@ fn measure(
     device: &OurDevice,
     mitsuba: Option<&Mitsuba>,
     arguments: &Arguments,
-    records: &mut Vec<Record>,
+    results: &mut Results,
 ) -> Result<(), BenchError> {
     let start_ups = device.start_ups(case, arguments)?;
     let mut configurations = mitsuba.map(|peer| peer.configurations(case)).unwrap_or_default();
@@ -87,14 +95,28 @@ fn measure(
         let first = seed == FIRST_SEED;
         let start_up = Some(if first { start_ups.cold } else { start_ups.warm });
         for run in device.measure(case, seed, &arguments.budgets(), start_up)? {
-            records.push(score(case, "Tyndall", "default", seed, first, run)?);
+            results.records.push(score(case, "Tyndall", "default", seed, first, run)?);
         }
         let Some(peer) = mitsuba else { continue };
-        for configuration in &configurations {
-            for run in peer.measure(case, configuration, seed, &arguments.budgets())? {
-                records.push(score(case, "Mitsuba", &configuration.to_string(), seed, first, run)?);
+        let mut able = Vec::new();
+        for configuration in configurations {
+            match peer.measure(case, &configuration, seed, &arguments.budgets()) {
+                Ok(runs) => {
+                    for run in runs {
+                        results.records.push(score(case, "Mitsuba", &configuration.to_string(), seed, first, run)?);
+                    }
+                    able.push(configuration);
+                }
+                // The rest can go on. The results say that this one is missing.
+                Err(error) => {
+                    eprintln!("{error}");
+                    let text = error.to_string();
+                    let cause = text.trim().lines().last().unwrap_or_default();
+                    results.failures.push(format!("{}, {configuration}: {cause}", case.name));
+                }
             }
         }
+        configurations = able;
         // The next round begins with another one of them.
         if !configurations.is_empty() {
             configurations.rotate_left(1);
@@ -143,7 +165,7 @@ fn score(
 
 /// Writes all files anew.
 fn publish(
-    records: &[Record],
+    results: &Results,
     device: &OurDevice,
     mitsuba: Option<&Mitsuba>,
     arguments: &Arguments,
@@ -152,15 +174,16 @@ fn publish(
     let folder = arguments.output.clone().unwrap_or_else(|| root.join("docs/benchmarks"));
     std::fs::create_dir_all(&folder).map_err(|source| BenchError::Write { path: folder.clone(), source })?;
 
-    let summaries = results::summarize(records);
+    let summaries = results::summarize(&results.records);
     let conditions = output::Conditions {
         device: device.description(),
         peer: mitsuba.map(|peer| peer.version.clone()),
         seeds: arguments.seeds,
         budgets: arguments.budgets().iter().map(ToString::to_string).collect(),
+        failures: results.failures.clone(),
     };
     let table = output::markdown(&summaries, &conditions);
-    write_text(&folder.join("time_to_error.csv"), &output::csv(records))?;
+    write_text(&folder.join("time_to_error.csv"), &output::csv(&results.records))?;
     write_text(&folder.join("time_to_error.md"), &table)?;
     write_text(&folder.join("time_to_error.svg"), &plot::svg(&summaries)?)?;
     if arguments.output.is_none() {

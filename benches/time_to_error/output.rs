@@ -14,6 +14,8 @@ pub struct Conditions {
     pub seeds: u32,
     /// The budgets.
     pub budgets: Vec<String>,
+    /// What could not take part, each with scene, configuration and cause in one line.
+    pub failures: Vec<String>,
 }
 
 /// Every picture, one a line. Errors are those against the reference; `ref_…` are the reference's own.
@@ -50,7 +52,7 @@ pub fn csv(records: &[Record]) -> String {
 /// The tables: Tyndall against the strongest configuration of the other, if there is one, and everything that was measured.
 pub fn markdown(summaries: &[Summary], conditions: &Conditions) -> String {
     let mut text = String::new();
-    let Conditions { device, peer, seeds, budgets } = conditions;
+    let Conditions { device, peer, seeds, budgets, failures } = conditions;
     let processor = processor();
     let _ = writeln!(text, "Tyndall {} on {device}; {processor}.", env!("CARGO_PKG_VERSION"));
     let against = peer.as_ref().map(|peer| format!(" Against {peer}, in turns.")).unwrap_or_default();
@@ -67,7 +69,7 @@ pub fn markdown(summaries: &[Summary], conditions: &Conditions) -> String {
         let start = |time: Option<Time>| time.map_or("–".to_owned(), |time| format!("{:.1}", time.wall));
         let _ = writeln!(
             text,
-            "| {} | {} {} | {:.3} | {:.3} | {} | {} | {} | {} | {} | {} | {:+.1} |",
+            "| {} | {} {} | {:.3} | {:.3} | {} | {} | {} | {} | {} | {} | {:+.1}{} |",
             summary.scene,
             summary.renderer,
             summary.configuration,
@@ -80,7 +82,15 @@ pub fn markdown(summaries: &[Summary], conditions: &Conditions) -> String {
             figure(Measure::Trimmed, Clock::Cpu),
             figure(Measure::Mse, Clock::Cpu),
             summary.mean_z,
+            if summary.is_credible() { "" } else { " **!**" },
         );
+    }
+    if summaries.iter().any(|summary| !summary.is_credible()) {
+        text.push_str("\n**!** The mean is not that of the reference: biased, or too few samples. Not compared.\n");
+    }
+    if !failures.is_empty() {
+        text.push_str("\nCould not take part:\n\n");
+        failures.iter().for_each(|failure| text.extend(["- ", failure, "\n"]));
     }
     text
 }

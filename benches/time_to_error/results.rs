@@ -167,6 +167,10 @@ const CLEAR: f64 = 2.0;
 /// ...or ten times, where nothing can be taken away, for then the rest is in the figure.
 const CLEAR_UNKNOWN: f64 = 10.0;
 
+/// A mean z beyond this is no chance: the pictures are biased, or their samples too few to have met what is rare and bright. Either
+/// way their error is larger than it seems.
+const CREDIBLE_Z: f64 = 4.0;
+
 impl Point {
     /// From the pictures of one budget, of which there is at least one.
     fn of(records: &[&Record]) -> Point {
@@ -220,6 +224,11 @@ impl Summary {
         }
     }
 
+    /// Whether the mean of the pictures is that of the reference, as far as one can tell.
+    pub fn is_credible(&self) -> bool {
+        self.mean_z.abs() <= CREDIBLE_Z
+    }
+
     /// Error × seconds at each budget whose error is known, with the budget.
     fn products(&self, measure: Measure, clock: Clock) -> Vec<(usize, f64)> {
         let start = self.cold_start.unwrap_or_default().cpu;
@@ -259,7 +268,8 @@ impl Summary {
         Some(Ratio { value, at_largest, spread, budgets: quotients.len() })
     }
 
-    /// The strongest of the others on this scene, for this measure and clock, by the number that `by` takes from the ratio.
+    /// The strongest of the credible others on this scene, for this measure and clock, by the number that `by` takes from the
+    /// ratio. `None` if this one is not credible itself.
     pub fn strongest<'a>(
         &self,
         all: &'a [Summary],
@@ -268,6 +278,7 @@ impl Summary {
     ) -> Option<(&'a Summary, Ratio)> {
         all.iter()
             .filter(|other| other.scene == self.scene && other.renderer != self.renderer)
+            .filter(|other| self.is_credible() && other.is_credible())
             .filter_map(|other| Some((other, self.ratio(other, measure, clock)?)))
             .min_by(|(_, a), (_, b)| by(a).total_cmp(&by(b)))
     }
