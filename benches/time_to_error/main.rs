@@ -111,7 +111,7 @@ fn measure(
                 Err(error) => {
                     eprintln!("{error}");
                     let text = error.to_string();
-                    let cause = text.trim().lines().last().unwrap_or_default();
+                    let cause: String = text.trim().lines().last().unwrap_or_default().chars().take(160).collect();
                     results.failures.push(format!("{}, {configuration}: {cause}", case.name));
                 }
             }
@@ -189,7 +189,8 @@ fn publish(
     if arguments.output.is_none() {
         let path = root.join("docs/BENCHMARKS.md");
         let page = std::fs::read_to_string(&path).map_err(|source| BenchError::Read { path: path.clone(), source })?;
-        let page = page::embed(&page, "time_to_error", &table)
+        let plot = "![CPU seconds against relMSE, a panel for each scene](benchmarks/time_to_error.svg)";
+        let page = page::embed(&page, "time_to_error", &format!("{table}\n{plot}"))
             .ok_or_else(|| BenchError::Usage(format!("{} has no place for the table", path.display())))?;
         write_text(&path, &page)?;
     }

@@ -10,7 +10,7 @@ pub struct Conditions {
     pub device: String,
     /// The other renderer with its version, if one took part.
     pub peer: Option<String>,
-    /// Pictures for each budget.
+    /// Pictures for each budget and configuration.
     pub seeds: u32,
     /// The budgets.
     pub budgets: Vec<String>,
@@ -56,7 +56,7 @@ pub fn markdown(summaries: &[Summary], conditions: &Conditions) -> String {
     let processor = processor();
     let _ = writeln!(text, "Tyndall {} on {device}; {processor}.", env!("CARGO_PKG_VERSION"));
     let against = peer.as_ref().map(|peer| format!(" Against {peer}, in turns.")).unwrap_or_default();
-    let _ = writeln!(text, "Budgets: {}; {seeds} pictures for each.{against}\n", budgets.join(", "));
+    let _ = writeln!(text, "Budgets: {}; seeds: {seeds}.{against}\n", budgets.join(", "));
     if peer.is_some() {
         ratios(&mut text, summaries);
     }
