@@ -1,0 +1,153 @@
+//! Tyndall's part: renders with the library as the program does, and takes the time.
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use rustix::time::{ClockId, clock_gettime};
+use tyndall::gpu::{Device, DeviceChoice, Renderer};
+use tyndall::image::Image;
+use tyndall::pack::Packed;
+use tyndall::render::session::{self, Options};
+use tyndall::render::{Backend, picture};
+use tyndall::scene::{Crop, Scene};
+
+use super::arguments::Arguments;
+use super::case::{Case, load_scene};
+use super::error::BenchError;
+use super::results::{Budget, Run, Time};
+
+/// Samples after which even a budget in seconds ends.
+const MOST_SAMPLES: u32 = 1 << 30;
+
+/// The device that is measured.
+pub struct OurDevice {
+    device: Arc<Device>,
+}
+
+/// What it takes to start: from the start of the program until the first sample is there.
+pub struct StartUps {
+    /// With all caches empty, as on the first render of a scene.
+    pub cold: Time,
+    /// With the caches that the first left.
+    pub warm: Time,
+}
+
+impl OurDevice {
+    /// Opens the device that `choice` names, as `tyndall render --device` does.
+    pub fn open(choice: &str) -> Result<OurDevice, BenchError> {
+        let choice = match (choice, choice.parse()) {
+            ("auto", _) => DeviceChoice::Best,
+            (_, Ok(index)) => DeviceChoice::Index(index),
+            (name, Err(_)) => DeviceChoice::Name(name.to_owned()),
+        };
+        let device = Device::open(&choice).map_err(|error| BenchError::Usage(error.to_string()))?;
+        Ok(OurDevice { device })
+    }
+
+    /// Name and driver.
+    pub fn description(&self) -> String {
+        format!("{} ({})", self.device.info.name, self.device.info.driver)
+    }
+
+    /// Prepares a scene. The first sample is rendered as well, for drivers compile when they first run a kernel.
+    pub fn renderer<'a>(&self, name: &'a str, scene: &'a Scene, seed: u32) -> Result<Ready<'a>, BenchError> {
+        let error = |cause: String| BenchError::Render { scene: name.to_owned(), cause };
+        let packed = Packed::new(scene, seed).map_err(|cause| error(cause.to_string()))?;
+        let mut backend = Renderer::new(&self.device, &packed).map_err(|cause| error(cause.to_string()))?;
+        backend.render(0..1).map_err(|cause| error(cause.to_string()))?;
+        Ok(Ready { name, scene, seed, backend })
+    }
+
+    /// One picture for each budget.
+    pub fn measure(
+        &self,
+        case: &Case,
+        seed: u32,
+        budgets: &[Budget],
+        start_up: Option<Time>,
+    ) -> Result<Vec<Run>, BenchError> {
+        let mut renderer = self.renderer(&case.name, &case.scene, seed)?;
+        let run = |(index, &budget): (usize, &Budget)| {
+            let (image, spp, time) = renderer.render(budget)?;
+            Ok(Run { budget: index, spp, image, time, start_up })
+        };
+        budgets.iter().enumerate().map(run).collect()
+    }
+
+    /// Measures two starts of a process of its own: all that a render costs beside its samples.
+    pub fn start_ups(&self, case: &Case, arguments: &Arguments) -> Result<StartUps, BenchError> {
+        let what = || format!("a start with {}", case.name);
+        let failed = |cause: String| BenchError::Child { what: what(), cause };
+        let caches = tempfile::tempdir().map_err(|error| failed(error.to_string()))?;
+        let program = std::env::current_exe().map_err(|error| failed(error.to_string()))?;
+        let start = || {
+            let begin = Instant::now();
+            let output = Command::new(&program)
+                .args(["--device", &arguments.device, "--start-up"])
+                .arg(&case.path)
+                .env("XDG_CACHE_HOME", caches.path())
+                .env("MESA_SHADER_CACHE_DIR", caches.path().join("mesa"))
+                .output()
+                .map_err(|error| failed(error.to_string()))?;
+            let wall = begin.elapsed().as_secs_f64();
+            if !output.status.success() {
+                return Err(failed(String::from_utf8_lossy(&output.stderr).into_owned()));
+            }
+            let text = String::from_utf8_lossy(&output.stdout);
+            let cpu = text.trim().parse().map_err(|_| failed(format!("it said {text:?}")))?;
+            Ok(Time { wall, cpu })
+        };
+        Ok(StartUps { cold: start()?, warm: start()? })
+    }
+}
+
+/// What the child process of [`OurDevice::start_ups`] does: renders one sample of one pixel, and prints the CPU time of its life.
+pub fn start_up_child(path: &Path, arguments: &Arguments) -> Result<(), BenchError> {
+    let mut scene = load_scene(path)?;
+    scene.film.crop = Crop { x: scene.film.width / 2, y: scene.film.height / 2, width: 1, height: 1 };
+    OurDevice::open(&arguments.device)?.renderer("the scene", &scene, 0)?;
+    println!("{}", cpu_time());
+    Ok(())
+}
+
+/// A scene on the device, compiled.
+pub struct Ready<'a> {
+    name: &'a str,
+    scene: &'a Scene,
+    seed: u32,
+    backend: Renderer,
+}
+
+impl Ready<'_> {
+    /// Renders a picture, and returns it with the samples of each pixel and the time that they took.
+    pub fn render(&mut self, budget: Budget) -> Result<(Image, u32, Time), BenchError> {
+        let options = match budget {
+            Budget::Samples(spp) => Options { samples: 0..spp, time_limit: None },
+            Budget::Seconds(seconds) => {
+                Options { samples: 0..MOST_SAMPLES, time_limit: Some(Duration::from_secs_f64(seconds)) }
+            }
+        };
+        let error = |cause: String| BenchError::Render { scene: self.name.to_owned(), cause };
+        let crop = self.scene.film.crop;
+        let pixels = crop.width as usize * crop.height as usize;
+        let (begin, begin_cpu) = (Instant::now(), cpu_time());
+        let rendered = session::render(&mut self.backend, pixels, &options, &AtomicBool::new(false), &mut |_| {})
+            .map_err(|cause| error(cause.to_string()))?;
+        let time = Time { wall: begin.elapsed().as_secs_f64(), cpu: cpu_time() - begin_cpu };
+        let invalid: u64 = rendered.film.invalid().iter().sum();
+        if invalid > 0 {
+            return Err(error(format!("{invalid} samples are not finite")));
+        }
+        let image = picture::assemble(self.scene, &rendered, self.backend.device(), self.seed);
+        Ok((image, rendered.film.samples(), time))
+    }
+}
+
+/// Seconds that all cores have spent on this process.
+fn cpu_time() -> f64 {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
