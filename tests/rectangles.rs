@@ -197,7 +197,7 @@ fn their_density_integrates_to_one() {
 }
 
 /// Irradiance from a rectangle of radiance 1 on a parallel surface at the distance h: π times the configuration factor, which is,
-/// of a rectangle a × b with a corner above the point (Howell, A catalog of radiation heat transfer configuration factors, B-4),
+/// of a rectangle a × b with a corner above the point (Siegel and Howell, Thermal Radiation Heat Transfer),
 ///   [A/√(1 + A²) atan(B/√(1 + A²)) + B/√(1 + B²) atan(A/√(1 + B²))]/2π        A = a/h, B = b/h.
 fn irradiance(point: DVec3) -> f64 {
     let corner = |x: f64, z: f64| {
@@ -290,12 +290,19 @@ fn images_have_the_same_expectation_and_less_noise() {
         let (mean, error) = mean_and_error(&differences);
         (mean / error).abs()
     };
-    for (name, other, spp) in [("by area", by_area, 2048), ("by chance", chance, 4096)] {
-        let other = images::on_device(&other, spp);
-        eprintln!("{name}: z = {:.2}, of a picture 2 % brighter {:.1}", z(&other, 1.0), z(&other, 1.02));
+    for (name, other, spp) in [("by area", &by_area, 4096), ("by chance", &chance, 4096)] {
+        let other = images::on_device(other, spp);
+        eprintln!("{name}: z = {:.2}, of a picture 4 % brighter {:.1}", z(&other, 1.0), z(&other, 1.04));
         assert!(z(&other, 1.0) < 4.0, "{name}: z = {}", z(&other, 1.0));
-        assert!(z(&other, 1.02) > 5.0, "{name}: blind to 2 %");
+        assert!(z(&other, 1.04) > 5.0, "{name}: blind to 4 %");
     }
+    let noise = |packed| {
+        let image = images::on_device(packed, 16);
+        image.iter().zip(&one).map(|(a, b)| ((a.y - b.y) / b.y).powi(2)).sum::<f64>() / image.len() as f64
+    };
+    let [less, more] = [&scenes::pack(&scene, 4), &by_area].map(noise);
+    eprintln!("relative mean square error {less:.4}, by area {more:.4}");
+    assert!(less < 0.9 * more, "no less noise than by area: {less}, {more}");
 }
 
 #[test]
@@ -327,7 +334,8 @@ fn vertices_on_and_behind_the_light_give_no_invalid_numbers() {
             for side in [-1.0, 1.0] {
                 let point = v(x, side * h, z);
                 for [direction, weight, _] in sampled(LIGHT_RECTANGLE, point, &numbers) {
-                    let valid = weight.iter().all(|number| number.is_finite());
+                    // Edge-on, the density by area may be infinite: then no other technique counts.
+                    let valid = weight[..3].iter().all(|number| number.is_finite()) && !weight[3].is_nan();
                     let seen = weight[0] > 0.0;
                     assert!(
                         valid && (!seen || direction.iter().all(|number| number.is_finite())),
