@@ -260,15 +260,20 @@ fn lights() -> Vec<Light> {
         Light { kind: LIGHT_SPOT, edge_1: Vec3::new(1.9, 0.8, 1.0 / 1.1), normal: Vec3::NEG_Y, ..point },
         Light { kind: LIGHT_SPOT, edge_1: Vec3::new(PI as f32, PI as f32, 0.0), normal: Vec3::X, ..point },
         Light { edge_2: Vec3::new(0.0, 0.0, 0.5), ..plane(LIGHT_RECTANGLE, Vec3::NEG_Y, 0.3) },
-        // Tilted by the Pythagorean triple (3, 4, 5), and narrow.
+        // Tilted by the Pythagorean triple (3, 4, 5), and narrow, either way.
         Light {
-            edge_1: Vec3::new(0.03, 0.0, 0.0),
+            edge_1: Vec3::new(0.001, 0.0, 0.0),
             edge_2: Vec3::new(0.0, 0.48, 0.64),
-            ..plane(LIGHT_RECTANGLE, Vec3::new(0.0, -0.8, 0.6), 0.024)
+            ..plane(LIGHT_RECTANGLE, Vec3::new(0.0, -0.8, 0.6), 0.0008)
+        },
+        Light {
+            edge_1: Vec3::new(0.0, 0.48, 0.64),
+            edge_2: Vec3::new(0.003, 0.0, 0.0),
+            ..plane(LIGHT_RECTANGLE, Vec3::new(0.0, -0.8, 0.6), 0.0024)
         },
         Light { kind: LIGHT_DIRECTIONAL, normal: Vec3::new(0.6, -0.8, 0.0), radiance: Vec3::ONE, ..Light::default() },
     ];
-    let table = alias_table(&[0.2, 0.2, 0.15, 0.05, 0.01, 0.19, 0.03, 0.02, 0.06, 0.04, 0.05]);
+    let table = alias_table(&[0.2, 0.2, 0.15, 0.05, 0.01, 0.19, 0.03, 0.02, 0.06, 0.03, 0.01, 0.05]);
     for (light, (threshold, alias)) in lights.iter_mut().zip(table) {
         light.alias_threshold = threshold as f32;
         light.alias = alias;
