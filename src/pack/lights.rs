@@ -15,8 +15,9 @@ const UNIFORM_SHARE: f64 = 0.1;
 
 /// Largest cosine between the edges of what counts as a rectangle.
 const PERPENDICULAR: f64 = 1e-5;
-/// Largest ratio of the edges of a rectangle that is sampled by solid angle.
-const LARGEST_ASPECT: f64 = 1e4;
+/// Largest ratio of the edges of a rectangle that is sampled by solid angle. Above a narrow one, where its ends are seen in opposite
+/// directions, the determinant of its corners is small beside numbers that cancel: at 64 the solid angle still is right to 1e-4.
+const LARGEST_ASPECT: f64 = 64.0;
 
 /// Collects lights with their power, then builds the table.
 #[derive(Default)]
@@ -215,8 +216,7 @@ fn parallelogram(first: [Vec3; 3], second: [Vec3; 3]) -> Option<[Vec3; 3]> {
     None
 }
 
-/// Whether the edges of a parallelogram are those of a rectangle, which can be sampled by solid angle. One that is too narrow cannot:
-/// products of its lengths leave the range of single precision.
+/// Whether the edges of a parallelogram are those of a rectangle that can be sampled by solid angle.
 fn perpendicular(one: Vec3, two: Vec3) -> bool {
     let (one, two) = (one.as_dvec3(), two.as_dvec3());
     let (length_one, length_two) = (one.length(), two.length());
