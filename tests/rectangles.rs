@@ -253,7 +253,7 @@ fn what_counts_as_a_rectangle() {
     assert_eq!(kind(z, x), LIGHT_RECTANGLE);
     assert_eq!(kind(Vec3::new(0.3, 0.4, 0.0), Vec3::new(-0.04, 0.03, 0.0)), LIGHT_RECTANGLE);
     assert_eq!(kind(x, z + Vec3::X * 1e-3), LIGHT_QUAD, "slanted");
-    assert_eq!(kind(x, z * 0.1), LIGHT_RECTANGLE, "narrow");
+    assert_eq!(kind(x, z * 0.2), LIGHT_RECTANGLE, "narrow");
     assert_eq!(kind(x, z * 0.02), LIGHT_QUAD, "too narrow");
     let mut table = LightTable::default();
     table.add_triangles(&[[Vec3::ZERO, x, z]], DVec3::ONE);

@@ -262,14 +262,14 @@ fn lights() -> Vec<Light> {
         Light { edge_2: Vec3::new(0.0, 0.0, 0.5), ..plane(LIGHT_RECTANGLE, Vec3::NEG_Y, 0.3) },
         // Tilted by the Pythagorean triple (3, 4, 5), and narrow, either way.
         Light {
-            edge_1: Vec3::new(0.0125, 0.0, 0.0),
+            edge_1: Vec3::new(0.05, 0.0, 0.0),
             edge_2: Vec3::new(0.0, 0.48, 0.64),
-            ..plane(LIGHT_RECTANGLE, Vec3::new(0.0, -0.8, 0.6), 0.01)
+            ..plane(LIGHT_RECTANGLE, Vec3::new(0.0, -0.8, 0.6), 0.04)
         },
         Light {
             edge_1: Vec3::new(0.0, 0.48, 0.64),
-            edge_2: Vec3::new(0.0125, 0.0, 0.0),
-            ..plane(LIGHT_RECTANGLE, Vec3::new(0.0, -0.8, 0.6), 0.01)
+            edge_2: Vec3::new(0.05, 0.0, 0.0),
+            ..plane(LIGHT_RECTANGLE, Vec3::new(0.0, -0.8, 0.6), 0.04)
         },
         Light { kind: LIGHT_DIRECTIONAL, normal: Vec3::new(0.6, -0.8, 0.0), radiance: Vec3::ONE, ..Light::default() },
     ];

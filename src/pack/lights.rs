@@ -16,8 +16,8 @@ const UNIFORM_SHARE: f64 = 0.1;
 /// Largest cosine between the edges of what counts as a rectangle.
 const PERPENDICULAR: f64 = 1e-5;
 /// Largest ratio of the edges of a rectangle that is sampled by solid angle. Above a narrow one, where its ends are seen in opposite
-/// directions, the determinant of its corners is small beside numbers that cancel: at 64 the solid angle still is right to 1e-4.
-const LARGEST_ASPECT: f64 = 64.0;
+/// directions, the determinant of its corners is small beside numbers that cancel: at 16 the solid angle still is right to 1e-4.
+const LARGEST_ASPECT: f64 = 16.0;
 
 /// Collects lights with their power, then builds the table.
 #[derive(Default)]
