@@ -11,8 +11,8 @@ use common::units::{run, vec4, widen};
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::PI;
 use tyndall::pack::layout::{
-    self, INFINITE_DISTANCE, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_TRIANGLE,
-    Light,
+    self, INFINITE_DISTANCE, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_SPOT,
+    LIGHT_TRIANGLE, Light,
 };
 use tyndall::pack::lights::alias_table;
 use tyndall::pack::sobol;
@@ -89,13 +89,15 @@ fn elementary_functions() {
         } else {
             [0; 2].map(|_| random.log_between(1e-9, 1e9) * if random.unit() < 0.5 { 1.0 } else { -1.0 })
         };
-        inputs.extend([vec4(&[u, x, y, x_of_angle]), vec4(&n.to_array())]);
+        let small = if k < 300 { u } else { random.between(-0.5 * PI, 0.5 * PI) };
+        inputs.extend([vec4(&[u, x, y, x_of_angle]), vec4(&n.extend(small).to_array())]);
     }
     let outputs: Vec<[f32; 4]> = run("math", &inputs, &[], inputs.len() / 2, inputs.len() / 2 * 3);
     let mut log = comparison("minus_log_1m");
     let mut exp = comparison("exp_minus");
     let mut frame = comparison("orthonormal_frame");
     let mut angle = comparison("arctan2");
+    let mut sine = comparison("sine");
     for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
         let [u, x] = [input[0][0], input[0][1]].map(f64::from);
         log.scalar(u, output[0][0], math::minus_log_1m(u));
@@ -103,6 +105,7 @@ fn elementary_functions() {
         exp.scalar(x, output[0][1], math::exp_minus(x));
         let [y, x_of_angle] = [input[0][2], input[0][3]].map(f64::from);
         angle.scalar(format!("{y}, {x_of_angle}"), output[0][2], math::arctan2(y, x_of_angle));
+        sine.scalar(input[1][3], output[0][3], math::sine(f64::from(input[1][3])));
         let n = widen(&input[1][..3]);
         let (tangent, bitangent) = math::orthonormal_frame(n);
         frame.vector(n, &output[1][..3], tangent);
@@ -112,6 +115,7 @@ fn elementary_functions() {
     log.finish();
     exp.finish();
     angle.finish();
+    sine.finish();
     frame.finish();
 }
 
@@ -255,14 +259,35 @@ fn lights() -> Vec<Light> {
         point,
         Light { kind: LIGHT_SPOT, edge_1: Vec3::new(1.9, 0.8, 1.0 / 1.1), normal: Vec3::NEG_Y, ..point },
         Light { kind: LIGHT_SPOT, edge_1: Vec3::new(PI as f32, PI as f32, 0.0), normal: Vec3::X, ..point },
+        Light { edge_2: Vec3::new(0.0, 0.0, 0.5), ..plane(LIGHT_RECTANGLE, Vec3::NEG_Y, 0.3) },
+        // Tilted by the Pythagorean triple (3, 4, 5), and narrow, either way.
+        Light {
+            edge_1: Vec3::new(0.05, 0.0, 0.0),
+            edge_2: Vec3::new(0.0, 0.48, 0.64),
+            ..plane(LIGHT_RECTANGLE, Vec3::new(0.0, -0.8, 0.6), 0.04)
+        },
+        Light {
+            edge_1: Vec3::new(0.0, 0.48, 0.64),
+            edge_2: Vec3::new(0.05, 0.0, 0.0),
+            ..plane(LIGHT_RECTANGLE, Vec3::new(0.0, -0.8, 0.6), 0.04)
+        },
         Light { kind: LIGHT_DIRECTIONAL, normal: Vec3::new(0.6, -0.8, 0.0), radiance: Vec3::ONE, ..Light::default() },
     ];
-    let table = alias_table(&[0.3, 0.2, 0.15, 0.05, 0.01, 0.19, 0.03, 0.02, 0.05]);
+    let table = alias_table(&[0.2, 0.2, 0.15, 0.05, 0.01, 0.19, 0.03, 0.02, 0.06, 0.03, 0.01, 0.05]);
     for (light, (threshold, alias)) in lights.iter_mut().zip(table) {
         light.alias_threshold = threshold as f32;
         light.alias = alias;
     }
     lights
+}
+
+/// Whether rounding may decide how a rectangle is sampled.
+fn undecided(light: &bindings::Light, point: DVec3) -> bool {
+    let rectangle = |scale: f64| {
+        let moved = light.origin + (point - light.origin) * scale;
+        light::spherical_rectangle(light, moved).solid_angle > 0.0
+    };
+    rectangle(1.0 - 1e-4) != rectangle(1.0 + 1e-4)
 }
 
 #[test]
@@ -288,6 +313,8 @@ fn light_sources() {
         "alias rescaled",
         "spot weight",
     ];
+    let [mut rectangle_direction, mut rectangle_weight, mut rectangle_pdf] =
+        ["rectangle light direction", "rectangle light weight", "rectangle light pdf"].map(comparison);
     let [mut direction, mut distance, mut sphere_distance, mut weight, mut pdf, mut rescaled, mut spot_weight] =
         names.map(comparison);
     for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
@@ -304,6 +331,11 @@ fn light_sources() {
                 let asked = light::sphere_light_pdf(light.edge_1.x, point.distance(light.origin));
                 (light::sample_sphere_light(light, point, u), asked)
             }
+            LIGHT_RECTANGLE => {
+                let found = light::sample_rectangle_light(light, point, u);
+                let cosine = -found.direction.dot(light.normal);
+                (found, light::rectangle_light_pdf(light, point, found.distance, cosine))
+            }
             _ => {
                 let found = light::sample_plane_light(light, point, u);
                 let cosine = -found.direction.dot(light.normal);
@@ -312,9 +344,18 @@ fn light_sources() {
         };
         // A plane light seen edge-on has no digits left in its cosine; a sphere's surface is where inside becomes
         // outside.
-        let edge_on = light.kind <= LIGHT_QUAD && found.direction.dot(light.normal).abs() < 0.02;
+        let rectangle = light.kind == LIGHT_RECTANGLE;
+        let edge_on = (light.kind <= LIGHT_QUAD || rectangle) && found.direction.dot(light.normal).abs() < 0.02;
         let border = light.kind == LIGHT_SPHERE && (point.distance(light.origin) / light.edge_1.x - 1.0).abs() < 1e-3;
-        if !border && !edge_on {
+        let undecided = rectangle && undecided(light, point);
+        if rectangle && !edge_on && !undecided {
+            rectangle_direction.vector(&case, &output[0][..3], found.direction);
+            rectangle_weight.vector(&case, &output[1][..3], found.weight);
+            rectangle_pdf.scalar(&case, output[1][3], found.pdf);
+            if found.pdf > 0.0 {
+                rectangle_pdf.scalar(&case, output[2][0], asked);
+            }
+        } else if !rectangle && !border && !edge_on {
             direction.vector(&case, &output[0][..3], found.direction);
             if light.kind == LIGHT_SPHERE {
                 // The rim of a sphere that covers little of the view is lost to rounding of the direction.
@@ -349,6 +390,7 @@ fn light_sources() {
         assert!((0.0..1.0).contains(&output[2][2]), "{case}: the rescaled number is {}", output[2][2]);
     }
     [direction, distance, sphere_distance, weight, pdf, rescaled, spot_weight].into_iter().for_each(Comparison::finish);
+    [rectangle_direction, rectangle_weight, rectangle_pdf].into_iter().for_each(Comparison::finish);
 }
 
 #[test]

@@ -43,8 +43,9 @@ vec2 plane_light_point(Light light, vec2 u) {
     return light.kind == LIGHT_TRIANGLE ? vec2(1.0 - s, u.y * s) : u;
 }
 
-LightSample sample_plane_light(Light light, vec3 point, vec2 u) {
-    vec2 v = plane_light_point(light, u);
+// What arrives from the point of a plane light with the coordinates v along its edges, sampled uniformly by the solid angle of the
+// whole light, or by area if that is 0.
+LightSample from_plane_light(Light light, vec3 point, vec2 v, float solid_angle) {
     vec3 offset = light.origin + light.edge_1 * v.x + light.edge_2 * v.y - point;
     float squared = dot(offset, offset);
     LightSample result;
@@ -52,9 +53,108 @@ LightSample sample_plane_light(Light light, vec3 point, vec2 u) {
     result.direction = offset / result.distance;
     float cos_light = -dot(result.direction, light.normal);
     bool seen = cos_light > 0.0 && squared > 0.0;
-    result.pdf = seen ? squared / (light.area * cos_light) : 0.0;
-    result.weight = seen ? light.radiance * (light.area * cos_light / squared) : vec3(0.0);
+    bool by_area = solid_angle == 0.0;
+    result.pdf = seen ? (by_area ? squared / (light.area * cos_light) : 1.0 / solid_angle) : 0.0;
+    result.weight = seen ? light.radiance * (by_area ? light.area * cos_light / squared : solid_angle) : vec3(0.0);
     return result;
+}
+
+LightSample sample_plane_light(Light light, vec3 point, vec2 u) {
+    return from_plane_light(light, point, plane_light_point(light, u), 0.0);
+}
+
+// A rectangle as a point sees it, in units of its first edge: it spans [low, high] in a plane at the height h above the point, along
+// axes that are parallel to its edges and begin below the point.
+struct SphericalRectangle {
+    vec2 low;
+    vec2 high;
+    float h;
+    float solid_angle;  // 0 if the rectangle is to be sampled by area
+};
+
+// Below this solid angle, uniform points are as good.
+const float LEAST_SOLID_ANGLE = 2e-4;
+// Square of the sine under which the nearest point of the rectangle is seen above its plane; below, the distances along the plane
+// cannot be told from sines that are next to 1.
+const float LEAST_SIN_SQUARED = 2e-3;
+
+// The solid angles A and B of the two triangles that make up the rectangle: tan(A/2) = N/D, where N is the determinant of the
+// corners (van Oosterom and Strackee 1983), here the height times the area for both, so that nothing cancels however small the
+// rectangle is. (A + B)/2 is the angle of the product of both complex numbers D + iN.
+SphericalRectangle spherical_rectangle(Light light, vec3 point) {
+    vec3 offset = light.origin - point;
+    float unit = 1.0 / dot(light.edge_1, light.edge_1);
+    float height = light.area * unit;
+    SphericalRectangle r;
+    r.low = vec2(dot(offset, light.edge_1) * unit, dot(offset, light.edge_2) / light.area);
+    r.high = r.low + vec2(1.0, height);
+    r.h = -dot(offset, light.normal) * sqrt(unit);
+    r.solid_angle = 0.0;
+    float h2 = r.h * r.h;
+    vec2 near = max(max(r.low, -r.high), 0.0);
+    float nearest = dot(near, near) + h2;
+    if (r.h > 0.0 && h2 > LEAST_SIN_SQUARED * nearest && height > LEAST_SOLID_ANGLE * nearest) {
+        vec2 low2 = r.low * r.low, high2 = r.high * r.high, mixed = r.low * r.high;
+        float r00 = sqrt(low2.x + low2.y + h2), r10 = sqrt(high2.x + low2.y + h2);
+        float r01 = sqrt(low2.x + high2.y + h2), r11 = sqrt(high2.x + high2.y + h2);
+        float diagonal = mixed.x + mixed.y + h2;
+        float n = r.h * height;
+        float d1 = r11 * (r00 * r10 + mixed.x + low2.y + h2) + diagonal * r10 + (high2.x + mixed.y + h2) * r00;
+        float d2 = r11 * (r00 * r01 + low2.x + mixed.y + h2) + diagonal * r01 + (mixed.x + high2.y + h2) * r00;
+        // The sum of both halves is at most pi, also where rounding says otherwise.
+        float solid_angle = 2.0 * arctan2(max(n * (d1 + d2), 0.0), d1 * d2 - n * n);
+        r.solid_angle = solid_angle >= LEAST_SOLID_ANGLE ? solid_angle : 0.0;
+    }
+    return r;
+}
+
+// high sqrt(low^2 + d2) - low sqrt(high^2 + d2) of an interval, given the two roots, without cancellation.
+float root_difference(float low, float high, float d2, float root_low, float root_high) {
+    float p = high * root_low, q = low * root_high;
+    return p * q > 0.0 ? (high - low) * (high + low) * d2 / (p + q) : p - q;
+}
+
+// The point of a rectangle, in coordinates along its edges from 0 to 1, that is uniform by solid angle (Ureña, Fajardo and King 2013).
+// With the sine s of the angle about the second axis, x = h s/sqrt(1 - s^2), and b = y/sqrt(y^2 + h^2) of both ends in y, the part of
+// the rectangle below x has the solid angle asin(s b_high) - asin(s b_low) up to a constant. A triangle with two of its angles
+// and this difference a gives s = sin a/sqrt(b_high^2 + b_low^2 - 2 b_high b_low cos a). Then y/sqrt(x^2 + y^2 + h^2) is uniform.
+vec2 sample_spherical_rectangle(SphericalRectangle r, vec2 u) {
+    float h2 = r.h * r.h, low2 = r.low.y * r.low.y, high2 = r.high.y * r.high.y;
+    float edge2 = r.low.x * r.low.x + h2;
+    float corner_low = sqrt(low2 + edge2), corner_high = sqrt(high2 + edge2);
+    float edge_y = r.low.x * r.h * root_difference(r.low.y, r.high.y, edge2, corner_low, corner_high);
+    float edge_x = h2 * corner_low * corner_high + r.low.x * r.low.x * r.low.y * r.high.y;
+    float half_a = 0.5 * (arctan2(edge_y, edge_x) + u.x * r.solid_angle);
+    float sin_half = sine(half_a), cos_half = sqrt(max(1.0 - sin_half * sin_half, 1e-12));
+
+    // Times the roots under both b. Of the two forms of the square root, the one whose terms have the same sign.
+    float root_low = sqrt(low2 + h2), root_high = sqrt(high2 + h2);
+    float difference = root_difference(r.low.y, r.high.y, h2, root_low, root_high);
+    float p = r.high.y * root_low, q = r.low.y * root_high;
+    float squared = p * q > 0.0 ? difference * difference + 4.0 * p * q * sin_half * sin_half
+                                : (p + q) * (p + q) - 4.0 * p * q * cos_half * cos_half;
+    float s = 2.0 * sin_half * cos_half * root_low * root_high / sqrt(squared);
+    float x = clamp(r.h * s / sqrt(max((1.0 - s) * (1.0 + s), 1e-12)), r.low.x, r.high.x);
+
+    float d2 = x * x + h2;
+    root_low = sqrt(low2 + d2);
+    root_high = sqrt(high2 + d2);
+    float w_low = r.low.y / root_low;
+    float w = w_low + u.y * root_difference(r.low.y, r.high.y, d2, root_low, root_high) / (root_low * root_high);
+    float y = clamp(w * sqrt(d2 / max((1.0 - w) * (1.0 + w), 1e-12)), r.low.y, r.high.y);
+    return vec2(x - r.low.x, (y - r.low.y) / (r.high.y - r.low.y));
+}
+
+LightSample sample_rectangle_light(Light light, vec3 point, vec2 u) {
+    SphericalRectangle r = spherical_rectangle(light, point);
+    vec2 v = r.solid_angle > 0.0 ? sample_spherical_rectangle(r, u) : u;
+    return from_plane_light(light, point, v, r.solid_angle);
+}
+
+// Density per solid angle of that, where the rectangle is met at a distance under the cosine at it.
+float rectangle_light_pdf(Light light, vec3 point, float distance, float cos_light) {
+    float solid_angle = spherical_rectangle(light, point).solid_angle;
+    return solid_angle > 0.0 ? 1.0 / solid_angle : area_pdf(light.area, distance, cos_light);
 }
 
 // 1 - cos of half the angle under which a sphere is seen from outside, without cancellation.

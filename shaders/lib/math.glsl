@@ -61,6 +61,13 @@ float arctan2(float y, float x) {
     return y < 0.0 ? -angle : angle;
 }
 
+// The sine for |x| <= pi/2 with a relative error below 2e-7, also next to 0, where drivers promise an absolute error only. The
+// polynomial has the least relative error of its degree, 5e-9.
+float sine(float x) {
+    float z = x * x;
+    return x + x * (z * (-0.16666661 + z * (0.0083330879 + z * (-0.00019811113 + z * 2.6089326e-6))));
+}
+
 // Two unit vectors that make up a right-handed frame with the unit vector n: tangent x bitangent = n (Duff et al. 2017).
 void orthonormal_frame(vec3 n, out vec3 tangent, out vec3 bitangent) {
     float side = n.z >= 0.0 ? 1.0 : -1.0;

@@ -16,7 +16,7 @@ struct FlightEnd {
 // A point of the light, chosen with two random numbers, if the light is somewhere.
 bool light_pivot(Light light, vec2 u, out vec3 pivot) {
     pivot = light.origin;
-    if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_QUAD) {
+    if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_QUAD || (HAS_RECTANGLE_LIGHTS && light.kind == LIGHT_RECTANGLE)) {
         vec2 v = plane_light_point(light, u);
         pivot += light.edge_1 * v.x + light.edge_2 * v.y;
     }

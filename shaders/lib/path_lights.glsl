@@ -58,9 +58,15 @@ void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
         return;
     }
     Light light = LIGHT(primitive.light - 1u);
-    float pdf = HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE
-        ? sphere_light_pdf(light.edge_1.x, distance(path.origin, light.origin))
-        : area_pdf(light.area, t, cos_light);
+    float pdf;
+    if (HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE) {
+        pdf = sphere_light_pdf(light.edge_1.x, distance(path.origin, light.origin));
+    } else if (HAS_RECTANGLE_LIGHTS && light.kind == LIGHT_RECTANGLE) {
+        // Of the vertex itself, as light sampling has it: near the light the offset of the ray's origin counts.
+        pdf = rectangle_light_pdf(light, path.point, t, cos_light);
+    } else {
+        pdf = area_pdf(light.area, t, cos_light);
+    }
     float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * pdf : 0.0;
     path.radiance += survived_throughput(path) * light.radiance * scattering_mis_weight(path, survival(path), light_pdf);
 }
@@ -114,6 +120,8 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u, vec2 decision) {
         found = LightSample(from_envmap(light, sky.direction), INFINITE_DISTANCE, sky.radiance / sky.pdf, sky.pdf);
     } else if (HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE) {
         found = sample_sphere_light(light, vertex.point, u);
+    } else if (HAS_RECTANGLE_LIGHTS && light.kind == LIGHT_RECTANGLE) {
+        found = sample_rectangle_light(light, vertex.point, u);
     } else {
         found = sample_plane_light(light, vertex.point, u);
     }

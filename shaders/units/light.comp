@@ -28,6 +28,9 @@ void main() {
     } else if (light.kind == LIGHT_SPHERE) {
         found = sample_sphere_light(light, point, u);
         pdf = sphere_light_pdf(light.edge_1.x, distance(point, light.origin));
+    } else if (light.kind == LIGHT_RECTANGLE) {
+        found = sample_rectangle_light(light, point, u);
+        pdf = rectangle_light_pdf(light, point, found.distance, -dot(found.direction, light.normal));
     } else {
         found = sample_plane_light(light, point, u);
         pdf = area_pdf(light.area, found.distance, -dot(found.direction, light.normal));

@@ -27,6 +27,8 @@ pub struct Features {
     pub spheres: bool,
     /// A triangle, parallelogram or sphere that emits.
     pub area_lights: bool,
+    /// A rectangle that emits.
+    pub rectangle_lights: bool,
     /// A sphere that emits.
     pub sphere_lights: bool,
     /// A point that emits.
@@ -86,7 +88,7 @@ impl Features {
         let kind = |kind: u32| packed.lights.iter().any(|light| light.kind & lowest == kind);
         let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
         let flag = |bit: u32| packed.surfaces.iter().any(|surface| surface.flags & bit != 0);
-        let area_lights = kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD) || kind(LIGHT_SPHERE);
+        let area_lights = kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD) || kind(LIGHT_RECTANGLE) || kind(LIGHT_SPHERE);
         let max_depth = max_depth.unwrap_or(u32::MAX);
         Features {
             media,
@@ -99,6 +101,7 @@ impl Features {
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
             spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
             area_lights,
+            rectangle_lights: kind(LIGHT_RECTANGLE),
             sphere_lights: kind(LIGHT_SPHERE),
             point_lights: kind(LIGHT_POINT),
             constant_light: kind(LIGHT_CONSTANT),
@@ -143,6 +146,7 @@ impl Features {
             boundaries: true,
             spheres: true,
             area_lights: true,
+            rectangle_lights: true,
             sphere_lights: true,
             point_lights: true,
             constant_light: true,
@@ -177,6 +181,7 @@ impl Features {
             ("HAS_BOUNDARIES", self.boundaries),
             ("HAS_SPHERES", self.spheres),
             ("HAS_AREA_LIGHTS", self.area_lights),
+            ("HAS_RECTANGLE_LIGHTS", self.rectangle_lights),
             ("HAS_SPHERE_LIGHTS", self.sphere_lights),
             ("HAS_POINT_LIGHTS", self.point_lights),
             ("HAS_CONSTANT_LIGHT", self.constant_light),

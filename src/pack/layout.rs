@@ -423,6 +423,8 @@ pub const TEXTURE_SKY: u32 = 255;
 /// [`Light::kind`]: a medium that emits, within a sphere about it: `origin` and `edge_1.x` are its centre and radius, `alias` and
 /// the rest as ever, `radiance` what the medium emits per canonical unit of length, `edge_1.y` the index of the medium.
 pub const LIGHT_VOLUME: u32 = 8;
+/// [`Light::kind`]: a parallelogram whose edges are perpendicular, sampled by solid angle.
+pub const LIGHT_RECTANGLE: u32 = 9;
 /// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
 pub const TILE: u32 = 8;
 /// Longest distance; rays that end nowhere end here.
@@ -476,6 +478,7 @@ pub fn glsl() -> String {
         ("LIGHT_ENVMAP", LIGHT_ENVMAP),
         ("LIGHT_TEXTURE_SHIFT", LIGHT_TEXTURE_SHIFT),
         ("LIGHT_VOLUME", LIGHT_VOLUME),
+        ("LIGHT_RECTANGLE", LIGHT_RECTANGLE),
         ("TILE", TILE),
         ("BLOCK_SAMPLES", crate::render::BLOCK_SAMPLES),
         ("POINT_BITS", sobol::POINT_BITS),

@@ -3,8 +3,8 @@
 use super::emission::EmittingVolume;
 use super::frame::Frame;
 use super::layout::{
-    LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_SPOT,
-    LIGHT_TEXTURE_SHIFT, LIGHT_TRIANGLE, LIGHT_VOLUME, Light,
+    LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_SPHERE,
+    LIGHT_SPOT, LIGHT_TEXTURE_SHIFT, LIGHT_TRIANGLE, LIGHT_VOLUME, Light,
 };
 use crate::scene;
 use glam::{DMat3, DVec3, Vec3};
@@ -12,6 +12,12 @@ use std::f64::consts::PI;
 
 /// Share of the choice that is uniform over the lights. The rest goes by power, which says little about what arrives.
 const UNIFORM_SHARE: f64 = 0.1;
+
+/// Largest cosine between the edges of what counts as a rectangle.
+const PERPENDICULAR: f64 = 1e-5;
+/// Largest ratio of the edges of a rectangle that is sampled by solid angle. Above a narrow one, where its ends are seen in opposite
+/// directions, the determinant of its corners is small beside numbers that cancel: at 16 the solid angle still is right to 1e-4.
+const LARGEST_ASPECT: f64 = 16.0;
 
 /// Collects lights with their power, then builds the table.
 #[derive(Default)]
@@ -33,7 +39,11 @@ impl LightTable {
             let area = cross.length() * if quad.is_some() { 1.0 } else { 0.5 };
             let light = Light {
                 origin: corner,
-                kind: if quad.is_some() { LIGHT_QUAD } else { LIGHT_TRIANGLE },
+                kind: match quad {
+                    Some(_) if perpendicular(one - corner, two - corner) => LIGHT_RECTANGLE,
+                    Some(_) => LIGHT_QUAD,
+                    None => LIGHT_TRIANGLE,
+                },
                 edge_1: one - corner,
                 edge_2: two - corner,
                 area,
@@ -204,6 +214,14 @@ fn parallelogram(first: [Vec3; 3], second: [Vec3; 3]) -> Option<[Vec3; 3]> {
         }
     }
     None
+}
+
+/// Whether the edges of a parallelogram are those of a rectangle that can be sampled by solid angle.
+fn perpendicular(one: Vec3, two: Vec3) -> bool {
+    let (one, two) = (one.as_dvec3(), two.as_dvec3());
+    let (length_one, length_two) = (one.length(), two.length());
+    one.dot(two).abs() <= PERPENDICULAR * length_one * length_two
+        && length_one.max(length_two) <= LARGEST_ASPECT * length_one.min(length_two)
 }
 
 /// For each line the threshold below which the line itself is taken, and the line that is taken otherwise.

@@ -228,6 +228,7 @@ const EMPTY_FEATURES: Features = Features {
     boundaries: false,
     spheres: false,
     area_lights: false,
+    rectangle_lights: false,
     sphere_lights: false,
     point_lights: false,
     constant_light: false,

@@ -1,7 +1,7 @@
 //! Mirror of `shaders/lib/light.glsl`: what lights send to a point, and the density with which they are sampled.
 
 use super::bindings::Light;
-use super::math::{arctan2, from_frame};
+use super::math::{arctan2, from_frame, sine};
 use super::warp::{square_to_cone, square_to_cone_pdf, square_to_sphere, square_to_sphere_pdf};
 use crate::pack::layout::{INFINITE_DISTANCE, LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_TRIANGLE};
 use glam::{DVec2, DVec3};
@@ -60,21 +60,123 @@ pub fn plane_light_point(light: &Light, u: DVec2) -> DVec2 {
     if light.kind == LIGHT_TRIANGLE { DVec2::new(1.0 - s, u.y * s) } else { u }
 }
 
-/// A point on a triangle or parallelogram.
-pub fn sample_plane_light(light: &Light, point: DVec3, u: DVec2) -> LightSample {
-    let v = plane_light_point(light, u);
+/// What arrives from the point of a plane light with the coordinates `v` along its edges, sampled uniformly by the solid angle of
+/// the whole light, or by area if that is 0.
+pub fn from_plane_light(light: &Light, point: DVec3, v: DVec2, solid_angle: f64) -> LightSample {
     let offset = light.origin + light.edge_1 * v.x + light.edge_2 * v.y - point;
     let squared = offset.dot(offset);
     let distance = squared.sqrt();
     let direction = offset / distance;
     let cos_light = -direction.dot(light.normal);
     let seen = cos_light > 0.0 && squared > 0.0;
+    let pdf = if solid_angle == 0.0 { squared / (light.area * cos_light) } else { 1.0 / solid_angle };
     LightSample {
         direction,
         distance,
-        pdf: if seen { squared / (light.area * cos_light) } else { 0.0 },
-        weight: if seen { light.radiance * (light.area * cos_light / squared) } else { DVec3::ZERO },
+        pdf: if seen { pdf } else { 0.0 },
+        weight: if seen { light.radiance / pdf } else { DVec3::ZERO },
     }
+}
+
+/// A point on a triangle or parallelogram, uniform by area.
+pub fn sample_plane_light(light: &Light, point: DVec3, u: DVec2) -> LightSample {
+    from_plane_light(light, point, plane_light_point(light, u), 0.0)
+}
+
+/// A rectangle as a point sees it, in units of its first edge: it spans \[low, high\] in a plane at the height `h` above the
+/// point, along axes that are parallel to its edges and begin below the point.
+#[derive(Clone, Copy, Debug)]
+pub struct SphericalRectangle {
+    /// The corner of the light.
+    pub low: DVec2,
+    /// The corner across.
+    pub high: DVec2,
+    /// Of the plane above the point; negative on the dark side.
+    pub h: f64,
+    /// 0 if the rectangle is to be sampled by area.
+    pub solid_angle: f64,
+}
+
+/// Below this solid angle, uniform points are as good.
+pub const LEAST_SOLID_ANGLE: f64 = 2e-4;
+/// Square of the sine under which the nearest point of the rectangle is seen above its plane, from which the solid angle is
+/// sampled.
+pub const LEAST_SIN_SQUARED: f64 = 2e-3;
+
+/// The rectangle as a point sees it. Solid angle: van Oosterom and Strackee (1983), for its two triangles together.
+pub fn spherical_rectangle(light: &Light, point: DVec3) -> SphericalRectangle {
+    let offset = light.origin - point;
+    let unit = 1.0 / light.edge_1.length_squared();
+    let height = light.area * unit;
+    let low = DVec2::new(offset.dot(light.edge_1) * unit, offset.dot(light.edge_2) / light.area);
+    let high = low + DVec2::new(1.0, height);
+    let h = -offset.dot(light.normal) * unit.sqrt();
+    let h2 = h * h;
+    let nearest = low.max(-high).max(DVec2::ZERO).length_squared() + h2;
+    let mut solid_angle = 0.0;
+    if h > 0.0 && h2 > LEAST_SIN_SQUARED * nearest && height > LEAST_SOLID_ANGLE * nearest {
+        let [c00, c10] = [low.extend(h), DVec3::new(high.x, low.y, h)];
+        let [c01, c11] = [DVec3::new(low.x, high.y, h), high.extend(h)];
+        let [r00, r10, r01, r11] = [c00, c10, c01, c11].map(DVec3::length);
+        let n = h * height;
+        let d1 = r00 * r10 * r11 + c00.dot(c10) * r11 + c00.dot(c11) * r10 + c10.dot(c11) * r00;
+        let d2 = r00 * r01 * r11 + c00.dot(c01) * r11 + c00.dot(c11) * r01 + c01.dot(c11) * r00;
+        solid_angle = 2.0 * arctan2((n * (d1 + d2)).max(0.0), d1 * d2 - n * n);
+    }
+    if solid_angle < LEAST_SOLID_ANGLE {
+        solid_angle = 0.0;
+    }
+    SphericalRectangle { low, high, h, solid_angle }
+}
+
+/// `high √(low² + d2) − low √(high² + d2)` of an interval, given the two roots.
+fn root_difference(low: f64, high: f64, d2: f64, root_low: f64, root_high: f64) -> f64 {
+    let (p, q) = (high * root_low, low * root_high);
+    if p * q > 0.0 { (high - low) * (high + low) * d2 / (p + q) } else { p - q }
+}
+
+/// The point of a rectangle, in coordinates along its edges from 0 to 1, that is uniform by solid angle (Ureña, Fajardo and King
+/// 2013).
+pub fn sample_spherical_rectangle(r: &SphericalRectangle, u: DVec2) -> DVec2 {
+    let (h2, low2, high2) = (r.h * r.h, r.low.y * r.low.y, r.high.y * r.high.y);
+    let edge2 = r.low.x * r.low.x + h2;
+    let (corner_low, corner_high) = ((low2 + edge2).sqrt(), (high2 + edge2).sqrt());
+    let edge_y = r.low.x * r.h * root_difference(r.low.y, r.high.y, edge2, corner_low, corner_high);
+    let edge_x = h2 * corner_low * corner_high + r.low.x * r.low.x * r.low.y * r.high.y;
+    let half_a = 0.5 * (arctan2(edge_y, edge_x) + u.x * r.solid_angle);
+    let sin_half = sine(half_a);
+    let cos_half = (1.0 - sin_half * sin_half).max(1e-12).sqrt();
+
+    let (root_low, root_high) = ((low2 + h2).sqrt(), (high2 + h2).sqrt());
+    let difference = root_difference(r.low.y, r.high.y, h2, root_low, root_high);
+    let (p, q) = (r.high.y * root_low, r.low.y * root_high);
+    let squared = if p * q > 0.0 {
+        difference * difference + 4.0 * p * q * sin_half * sin_half
+    } else {
+        (p + q) * (p + q) - 4.0 * p * q * cos_half * cos_half
+    };
+    let s = 2.0 * sin_half * cos_half * root_low * root_high / squared.sqrt();
+    let x = (r.h * s / ((1.0 - s) * (1.0 + s)).max(1e-12).sqrt()).max(r.low.x).min(r.high.x);
+
+    let d2 = x * x + h2;
+    let (root_low, root_high) = ((low2 + d2).sqrt(), (high2 + d2).sqrt());
+    let width = root_difference(r.low.y, r.high.y, d2, root_low, root_high) / (root_low * root_high);
+    let w = r.low.y / root_low + u.y * width;
+    let y = (w * (d2 / ((1.0 - w) * (1.0 + w)).max(1e-12)).sqrt()).max(r.low.y).min(r.high.y);
+    DVec2::new(x - r.low.x, (y - r.low.y) / (r.high.y - r.low.y))
+}
+
+/// A point on a rectangle, uniform by solid angle, or by area if it covers little of the view.
+pub fn sample_rectangle_light(light: &Light, point: DVec3, u: DVec2) -> LightSample {
+    let r = spherical_rectangle(light, point);
+    let v = if r.solid_angle > 0.0 { sample_spherical_rectangle(&r, u) } else { u };
+    from_plane_light(light, point, v, r.solid_angle)
+}
+
+/// Density per solid angle of that, where the rectangle is met at a distance under the cosine at it.
+pub fn rectangle_light_pdf(light: &Light, point: DVec3, distance: f64, cos_light: f64) -> f64 {
+    let solid_angle = spherical_rectangle(light, point).solid_angle;
+    if solid_angle > 0.0 { 1.0 / solid_angle } else { area_pdf(light.area, distance, cos_light) }
 }
 
 /// 1 − cos of half the angle under which a sphere is seen from outside.

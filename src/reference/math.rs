@@ -33,6 +33,11 @@ pub fn arctan2(y: f64, x: f64) -> f64 {
     if x == 0.0 && y == 0.0 { 0.0 } else { (y + 0.0).atan2(x) }
 }
 
+/// The sine for |x| ≤ π/2.
+pub fn sine(x: f64) -> f64 {
+    x.sin()
+}
+
 /// Two unit vectors (tangent, bitangent) that make up a right-handed frame with the unit vector n: tangent × bitangent
 /// = n (Duff et al. 2017).
 pub fn orthonormal_frame(n: DVec3) -> (DVec3, DVec3) {

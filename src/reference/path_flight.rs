@@ -7,7 +7,7 @@ use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minu
 use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight};
 use super::path_state::{Hit, NONE, Path, choose_light, sample_set};
 use super::ray::{offset_distance, vertex_clearance};
-use crate::pack::layout::{LIGHT_QUAD, LIGHT_TRIANGLE, PRIMITIVE_SPHERE};
+use crate::pack::layout::{LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_TRIANGLE, PRIMITIVE_SPHERE};
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
 /// Sets of random numbers that choose what a segment's equiangular sampling goes by.
@@ -26,7 +26,7 @@ pub struct FlightEnd {
 
 /// A point of the light, if the light is somewhere.
 fn light_pivot(light: &Light, u: DVec2) -> Option<DVec3> {
-    let on_plane = matches!(light.kind, LIGHT_TRIANGLE | LIGHT_QUAD);
+    let on_plane = matches!(light.kind, LIGHT_TRIANGLE | LIGHT_QUAD | LIGHT_RECTANGLE);
     let v = if on_plane { plane_light_point(light, u) } else { DVec2::ZERO };
     let offset = if on_plane { light.edge_1 * v.x + light.edge_2 * v.y } else { DVec3::ZERO };
     is_local(light).then_some(light.origin + offset)

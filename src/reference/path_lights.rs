@@ -3,8 +3,9 @@
 use super::bindings::{Light, Medium, Primitive, Tables, Texture};
 use super::bsdf::BsdfSample;
 use super::light::{
-    LightSample, area_pdf, sample_directional_light, sample_plane_light, sample_point_light, sample_sphere_light,
-    sample_spot_light, sample_volume_light, sphere_light_pdf, volume_light_pdf,
+    LightSample, area_pdf, rectangle_light_pdf, sample_directional_light, sample_plane_light, sample_point_light,
+    sample_rectangle_light, sample_sphere_light, sample_spot_light, sample_volume_light, sphere_light_pdf,
+    volume_light_pdf,
 };
 use super::math::max_component;
 use super::medium::{channel_weights, emitting_length, emitting_length_rgb};
@@ -14,8 +15,8 @@ use super::path_state::{
 use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
 use super::sky::{SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
 use crate::pack::layout::{
-    LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_TEXTURE_SHIFT,
-    LIGHT_VOLUME,
+    LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_SPOT,
+    LIGHT_TEXTURE_SHIFT, LIGHT_VOLUME,
 };
 use glam::{DVec2, DVec3};
 
@@ -75,10 +76,11 @@ pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: 
         return;
     }
     let light: &Light = &tables.lights[primitive.light as usize - 1];
-    let pdf = if light.kind == LIGHT_SPHERE {
-        sphere_light_pdf(light.edge_1.x, path.origin.distance(light.origin))
-    } else {
-        area_pdf(light.area, t, cos_light)
+    let pdf = match light.kind {
+        LIGHT_SPHERE => sphere_light_pdf(light.edge_1.x, path.origin.distance(light.origin)),
+        // Of the vertex itself, as light sampling has it: near the light the offset of the ray's origin counts.
+        LIGHT_RECTANGLE => rectangle_light_pdf(light, path.point, t, cos_light),
+        _ => area_pdf(light.area, t, cos_light),
     };
     let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
     let weight = scattering_mis_weight(tables, path, survival(path), light_pdf);
@@ -131,6 +133,7 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
         LIGHT_SPOT => sample_spot_light(light, vertex.point),
         LIGHT_DIRECTIONAL => sample_directional_light(light),
         LIGHT_SPHERE => sample_sphere_light(light, vertex.point, u),
+        LIGHT_RECTANGLE => sample_rectangle_light(light, vertex.point, u),
         _ => match envmap(tables, light) {
             Some(sky) => {
                 let SkySample { direction, radiance, pdf } = sample_sky(&tables.values, sky, u, decision);

@@ -7,6 +7,7 @@ use super::comparison::{Comparison, Tolerance};
 const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "minus_log_1m", relative: 3e-7, absolute: 0.0 },
     Tolerance { function: "exp_minus", relative: 3e-7, absolute: 2e-38 },
+    Tolerance { function: "sine", relative: 2e-7, absolute: 1e-37 },
     Tolerance { function: "arctan2", relative: 3e-7, absolute: 1e-37 },
     Tolerance { function: "orthonormal_frame", relative: 3e-7, absolute: 0.0 },
     Tolerance { function: "square_to_sphere", relative: 2e-6, absolute: 0.0 },
@@ -48,6 +49,10 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "sample_bsdf direction", relative: 4e-6, absolute: 0.0 },
     Tolerance { function: "sample_bsdf pdf", relative: 2e-5, absolute: 1e-15 },
     Tolerance { function: "sample_bsdf weight", relative: 2e-5, absolute: 1e-15 },
+    // Sines of flat angles, up to sqrt(1 - 2e-3), lose a factor of 500.
+    Tolerance { function: "rectangle light direction", relative: 3e-4, absolute: 0.0 },
+    Tolerance { function: "rectangle light weight", relative: 1e-4, absolute: 0.0 },
+    Tolerance { function: "rectangle light pdf", relative: 1e-4, absolute: 0.0 },
     Tolerance { function: "light direction", relative: 3e-6, absolute: 0.0 },
     Tolerance { function: "light distance", relative: 3e-6, absolute: 0.0 },
     Tolerance { function: "sphere light distance", relative: 4e-4, absolute: 0.0 },
