@@ -53,9 +53,9 @@ fn lit_through(bodies: Vec<Body>) -> Scene {
 }
 
 /// The transmittance of bodies between the floor at the height 0 and the light at the height 3.
-fn transmittance(bodies: Vec<Body>) -> f64 {
+fn transmittance(bodies: Vec<Body>) -> DVec3 {
     let packed = scenes::pack(&lit_through(bodies), 1);
-    images::average(&images::on_device(&packed, 16)).x * std::f64::consts::PI / 0.5
+    images::average(&images::on_device(&packed, 16)) * std::f64::consts::PI / 0.5
 }
 
 /// Whether a transmittance is that of an optical depth, up to `rounding` of the depth and of the image.

@@ -39,41 +39,34 @@ fn rendered(scene: &Scene) -> images::Image {
 
 /// Scenes with media in each other, lights that have a place or none, spheres, meshes, emission.
 fn all() -> Vec<(&'static str, Scene)> {
-    let wanted = ["gray box", "nested media", "point light", "all lights", "glow"];
+    let wanted = ["nested media", "all lights", "glow"];
     let all: Vec<_> = scenes::all().into_iter().filter(|(name, _)| wanted.contains(name)).collect();
     assert_eq!(all.len(), wanted.len());
     all
 }
 
 #[test]
-fn the_unit_of_length_does_not_matter() {
+fn neither_the_unit_of_length_nor_the_place_matters() {
     for (name, scene) in all() {
         let expected = rendered(&scene);
         for exponent in [-20, 20] {
             let image = rendered(&placed(&scene, f64::exp2(f64::from(exponent)), DVec3::ZERO));
             assert!(image == expected, "{name}, scaled by 2^{exponent}, is not the same to the last bit");
         }
-        // Other factors round differently, so that some paths take another turn.
-        for scale in [1e-6, 0.3, 1e6] {
-            let image = rendered(&placed(&scene, scale, DVec3::ZERO));
-            images::compare(&image, &expected).unwrap_or_else(|why| panic!("{name}, scaled by {scale:e}: {why}"));
-        }
-        let mut wrong = placed(&scene, 1e6, DVec3::ZERO);
-        wrong.media.iter_mut().for_each(|medium| medium.sigma_t *= 1.3);
-        images::compare(&rendered(&wrong), &expected).expect_err("30 % more extinction");
-        assert!(rendered(&wrong) != expected);
-    }
-}
-
-#[test]
-fn where_the_scene_lies_does_not_matter() {
-    for (name, scene) in all() {
-        let expected = rendered(&scene);
-        for offset in [DVec3::new(1e5, -1e5, 1e5), DVec3::new(-1e5, 3.0, 0.1)] {
-            let image = rendered(&placed(&scene, 1.0, offset));
-            images::compare(&image, &expected).unwrap_or_else(|why| panic!("{name}, moved by {offset}: {why}"));
+        // Other factors and places round differently, so that some paths take another turn.
+        let (origin, far) = (DVec3::ZERO, DVec3::new(1e5, -1e5, 1e5));
+        for (scale, offset) in [(1e-6, origin), (1e6, origin), (1.0, far), (1e-3, -far)] {
+            let image = rendered(&placed(&scene, scale, offset));
+            let case = format!("{name}, scaled by {scale:e} and moved by {offset}");
+            let share = images::compare(&image, &expected).unwrap_or_else(|why| panic!("{case}: {why}"));
+            eprintln!("{case}: {:.2} % of the pixels agree", share * 100.0);
+            assert!(image != expected, "{case}: nothing was placed");
             let brighter: images::Image = image.iter().map(|pixel| *pixel * 1.02).collect();
             images::compare(&brighter, &expected).expect_err("2 % brighter");
         }
     }
+    let (_, scene) = all().remove(0);
+    let mut wrong = placed(&scene, f64::exp2(20.0), DVec3::ZERO);
+    wrong.media.iter_mut().for_each(|medium| medium.sigma_t *= 1.3);
+    images::compare(&rendered(&wrong), &rendered(&scene)).expect_err("30 % more extinction");
 }
