@@ -102,9 +102,19 @@ fn albedos_from_nothing_to_everything() {
     assert_eq!(images::average(&images::on_device(&black, 16)), DVec3::ZERO);
     for (seed, (albedo, sigma)) in (1..).zip([(0.1, 1e3), (0.9, 1e3), (0.99, 1e4), (1.0 - 1e-4, 1e5)]) {
         let found = estimate(&face(sigma, albedo), seed, 64);
-        judge(&format!("albedo {albedo}"), found, half_space(albedo), 3e-3, 1e-2);
+        judge(&format!("albedo {albedo}"), found, half_space(albedo), 3e-3, 3e-2);
     }
     for (seed, albedo) in (1..).zip([1.0 - 1e-7, 1.0]) {
         judge(&format!("thin, albedo {albedo}"), estimate(&ball(3.0, albedo, 0.0), seed, 128), 1.0, 1e-5, 5e-3);
+    }
+}
+
+#[test]
+fn tmp_furnaces() {
+    for (sigma, g, spp) in [(3.0, 0.0, 2048), (3.0, 0.9999, 2048), (50.0, 0.0, 512), (500.0, 0.0, 128)] {
+        for seed in [101, 102] {
+            let (m, e) = estimate(&ball(sigma, 1.0, g), seed, spp);
+            eprintln!("TMP {sigma} {g} {m:.5} ± {e:.5} z {:.2}", (m - 1.0) / e);
+        }
     }
 }

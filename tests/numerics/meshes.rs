@@ -63,7 +63,7 @@ fn rays_through_vertices_and_edges() {
     }
 }
 
-/// A body that is hardly there, before a black one: whoever loses count of the boundaries sees the sky.
+/// A body that is not seen, before a black one: whoever loses count of the boundaries sees the sky.
 fn counted(mesh: &Mesh, direction: DVec3, faults: bool) -> Scene {
     let mut first = turned(mesh, direction);
     if let (Geometry::Mesh(mesh), true) = (&mut first, faults) {
@@ -73,7 +73,7 @@ fn counted(mesh: &Mesh, direction: DVec3, faults: bool) -> Scene {
         mesh.triangles = kept.copied().collect();
     }
     let black = scenes::cuboid(DMat4::from_scale(v(1.0, 0.25, 1.0)));
-    let bodies = vec![(gray(1e-9, 0.0, 0.0), first), (gray(1e4, 0.0, 0.0), black)];
+    let bodies = vec![(gray(0.0, 0.0, 0.0), first), (gray(1e4, 0.0, 0.0), black)];
     seen_through(bodies, v(0.0, 4.0, 0.0), DVec3::ZERO)
 }
 
@@ -89,24 +89,17 @@ fn a_medium_that_is_entered_is_left() {
 
 #[test]
 fn cameras_on_faces_edges_and_vertices() {
-    let cube = mesh_of(scenes::cuboid(DMat4::IDENTITY));
     for (name, start) in [("face", v(0.2, 0.1, 1.0)), ("edge", v(1.0, 0.1, 1.0)), ("vertex", v(1.0, 1.0, 1.0))] {
-        // Rays begin on the near plane, so that is what lies on the boundary. Whichever side that is, what follows is right.
         let inwards = (v(0.1, -0.2, -0.3) - start).normalize();
-        let length = (0..3).map(|axis| (start[axis] + inwards[axis].signum()) / -inwards[axis]);
-        let length = length.map(f64::abs).fold(f64::INFINITY, f64::min);
-        let way = (0..3).map(|axis| ((inwards[axis].signum() - start[axis]) / inwards[axis]).abs());
-        let way = way.fold(f64::INFINITY, f64::min).max(length.min(0.0));
-        for (direction, way) in [(inwards, way), (v(0.3, 0.4, 0.8).normalize(), 0.0)] {
-            let mut scene = seen_through(
-                vec![(gray(1.0, 0.0, 0.0), Geometry::Mesh(cube.clone()))],
-                start - direction * 0.25,
-                start + direction,
-            );
-            scene.camera.near_clip = 0.25;
-            let found = estimate(&scene, 1, 64);
-            eprintln!("camera on a {name}, {way}: {found:?}, {}", (-way).exp());
-        }
+        // To where the ray leaves the cube. It begins on the near plane, a hundredth away.
+        let way =
+            (0..3).map(|axis| (inwards[axis].signum() - start[axis]) / inwards[axis]).fold(f64::INFINITY, f64::min);
+        let cube = || vec![(gray(1.0, 0.0, 0.0), scenes::cuboid(DMat4::IDENTITY))];
+        let scene = seen_through(cube(), start, start + inwards);
+        judge(&format!("inwards from a {name}"), estimate(&scene, 1, 64), (0.01 - way).exp(), 1e-5, 3e-2);
+        let scene = seen_through(cube(), start, start - inwards);
+        let outwards = images::on_device(&scenes::pack(&scene, 1), 64);
+        assert!(outwards.iter().all(|pixel| *pixel == DVec3::ONE), "outwards from a {name}: something is in the way");
     }
 }
 
@@ -152,21 +145,22 @@ fn strips(strips: i32) -> Mesh {
 fn a_floor_of_slivers_is_a_floor() {
     // A million times as long as wide. Their own shadow once fell on them: a distance above 0 is found for the triangle that a ray
     // leaves.
-    for strip in [0, 200] {
-        let mut scene = lit_through(vec![]);
-        scene.shapes[0].geometry = Geometry::Mesh(strips(strip));
-        // Wide enough to see all the slivers, and no more.
-        scene.camera.fov_x = (3e-5f64 / 2.5).to_degrees();
-        for light in [v(0.0, 3.0, 0.0), v(2.0, 0.5, 0.1), v(0.0, 0.01, 2.0)] {
-            scene.lights = vec![Light::Point { position: light, intensity: DVec3::ONE }];
-            let image = images::on_device(&scenes::pack(&scene, 1), 16);
-            let expected = 0.5 / PI * light.normalize().y / light.length_squared();
-            let right = |found: f64| (found / expected - 1.0).abs() < 1e-4;
-            for pixel in &image {
-                assert!(right(pixel.x), "{strip} slivers, light at {light}: {}, expected {expected}", pixel.x);
-            }
-            assert!(!right(image[0].x * 0.999), "a shadow on one of a thousand rays is seen");
+    let mut scene = lit_through(vec![]);
+    // Wide enough to see all the slivers, and no more.
+    scene.camera.fov_x = (3e-5f64 / 2.5).to_degrees();
+    for light in [v(0.0, 3.0, 0.0), v(2.0, 0.5, 0.1), v(0.0, 0.01, 2.0)] {
+        scene.lights = vec![Light::Point { position: light, intensity: DVec3::ONE }];
+        let [plain, slivers] = [0, 200].map(|strip| {
+            scene.shapes[0].geometry = Geometry::Mesh(strips(strip));
+            images::on_device(&scenes::pack(&scene, 1), 16)
+        });
+        let expected = 0.5 / PI * light.normalize().y / light.length_squared();
+        assert!((images::average(&plain).x / expected - 1.0).abs() < 1e-4, "light at {light}, expected {expected}");
+        let right = |one: f64, other: f64| (one / other - 1.0).abs() < 1e-5;
+        for (plain, sliver) in plain.iter().zip(&slivers) {
+            assert!(right(sliver.x, plain.x), "slivers, light at {light}: {}, expected {}", sliver.x, plain.x);
         }
+        assert!(!right(plain[0].x * 15.0 / 16.0, plain[0].x), "a shadow on one sample is seen");
     }
 }
 
@@ -238,27 +232,29 @@ fn faces_that_coincide() {
 
 #[test]
 fn eight_media_in_each_other() {
-    for geometry in [cube as fn(DVec3, f64) -> Geometry, scenes::ball] {
-        let nested = |albedo: f64| {
-            let layer = |k: i32| (gray(0.3 * f64::from(k + 1), albedo, 0.1 * f64::from(k)), f64::from(8 - k) / 16.0);
-            (0..8).map(layer).collect::<Vec<_>>()
+    let of_ball = |half: f64, off: f64| 2.0 * (half * half - off * off).sqrt();
+    type Shape = (fn(DVec3, f64) -> Geometry, fn(f64, f64) -> f64);
+    let shapes: [Shape; 2] = [(cube, |half, _| 2.0 * half), (scenes::ball, of_ball)];
+    for (geometry, chord) in shapes {
+        let sigma = |k: i32| 0.3 * f64::from(k + 1);
+        let half = |k: i32| f64::from(8 - k) / 16.0;
+        let bodies = |albedo, center: DVec3| -> Vec<_> {
+            (0..8).map(|k| (gray(sigma(k), albedo, 0.1 * f64::from(k)), geometry(center, half(k)))).collect()
         };
-        let bodies = |albedo, center: DVec3| {
-            nested(albedo).into_iter().map(|(medium, half)| (medium, geometry(center, half))).collect::<Vec<_>>()
-        };
-        // Each layer but the last is 1/16 thick, and crossed twice.
-        let depth: f64 = (0..8).map(|k| 0.3 * f64::from(k + 1) / 16.0).sum();
-        let found = transmittance(bodies(0.0, v(0.01, 1.5, 0.02))).x;
-        // Off the centre of balls the ways differ a little.
-        check_transmittance(found, 2.0 * depth, 1e-3).unwrap_or_else(|why| panic!("through all: {why}"));
-        check_transmittance(found, 2.0 * depth - 0.3 / 16.0, 1e-3).expect_err("a layer less");
+        // Each layer but the last is crossed twice.
+        let way = |k: i32, off: f64| if k < 8 { chord(half(k), off) } else { 0.0 };
+        let depth = |off: f64| (0..8).map(|k| sigma(k) * (way(k, off) - way(k + 1, off))).sum::<f64>();
+        let (center, off) = (v(0.01, 1.5, 0.02), 0.01f64.hypot(0.02));
+        let found = transmittance(bodies(0.0, center)).x;
+        check_transmittance(found, depth(off), 1e-5).unwrap_or_else(|why| panic!("through all: {why}"));
+        check_transmittance(found, depth(off) - 1e-3, 1e-5).expect_err("another depth");
         // From the innermost outwards.
         let from_within = |albedo| {
             let mut scene = seen_through(bodies(albedo, DVec3::ZERO), DVec3::ZERO, v(0.0, 0.0, 1.0));
             scene.camera.near_clip = 1e-6;
             scene
         };
-        judge("out of the innermost", estimate(&from_within(0.0), 1, 64), (-depth).exp(), 1e-5, 8e-3);
+        judge("out of the innermost", estimate(&from_within(0.0), 1, 64), (-0.5 * depth(0.0)).exp(), 1e-5, 8e-3);
         judge("furnace of eight", estimate(&from_within(1.0), 2, 64), 1.0, 1e-5, 8e-3);
     }
 }
