@@ -60,7 +60,6 @@ fn neither_the_unit_of_length_nor_the_place_matters() {
             let case = format!("{name}, scaled by {scale:e} and moved by {offset}");
             let share = images::compare(&image, &expected).unwrap_or_else(|why| panic!("{case}: {why}"));
             eprintln!("{case}: {:.2} % of the pixels agree", share * 100.0);
-            assert!(image != expected, "{case}: nothing was placed");
             let brighter: images::Image = image.iter().map(|pixel| *pixel * 1.02).collect();
             images::compare(&brighter, &expected).expect_err("2 % brighter");
         }
