@@ -100,6 +100,13 @@ fn cameras_on_faces_edges_and_vertices() {
         let scene = seen_through(cube(), start, start - inwards);
         let outwards = images::on_device(&scenes::pack(&scene, 1), 64);
         assert!(outwards.iter().all(|pixel| *pixel == DVec3::ONE), "outwards from a {name}: something is in the way");
+        // With the near plane itself on the boundary, rounding decides on which side a ray begins. It is one of the two.
+        let mut scene = seen_through(cube(), start - inwards * 0.25, start);
+        scene.camera.near_clip = 0.25;
+        let either = images::average(&images::on_device(&scenes::pack(&scene, 1), 64)).x;
+        let possible = |found: f64| found > 0.95 * (-way).exp() && found <= 1.0;
+        assert!(possible(either), "near plane on a {name}: {either}");
+        assert!(!possible(0.9 * (-way).exp()) && !possible(f64::NAN), "the comparison is blind");
     }
 }
 
