@@ -89,23 +89,23 @@ fn a_medium_that_is_entered_is_left() {
 
 #[test]
 fn cameras_on_faces_edges_and_vertices() {
-    for (name, start) in [("face", v(0.2, 0.1, 1.0)), ("edge", v(1.0, 0.1, 1.0)), ("vertex", v(1.0, 1.0, 1.0))] {
+    for (name, start) in [("a face", v(0.2, 0.1, 1.0)), ("an edge", v(1.0, 0.1, 1.0)), ("a vertex", v(1.0, 1.0, 1.0))] {
         let inwards = (v(0.1, -0.2, -0.3) - start).normalize();
         // To where the ray leaves the cube. It begins on the near plane, a hundredth away.
         let way =
             (0..3).map(|axis| (inwards[axis].signum() - start[axis]) / inwards[axis]).fold(f64::INFINITY, f64::min);
         let cube = || vec![(gray(1.0, 0.0, 0.0), scenes::cuboid(DMat4::IDENTITY))];
         let scene = seen_through(cube(), start, start + inwards);
-        judge(&format!("inwards from a {name}"), estimate(&scene, 1, 64), (0.01 - way).exp(), 1e-5, 3e-2);
+        judge(&format!("inwards from {name}"), estimate(&scene, 1, 64), (0.01 - way).exp(), 1e-5, 3e-2);
         let scene = seen_through(cube(), start, start - inwards);
         let outwards = images::on_device(&scenes::pack(&scene, 1), 64);
-        assert!(outwards.iter().all(|pixel| *pixel == DVec3::ONE), "outwards from a {name}: something is in the way");
+        assert!(outwards.iter().all(|pixel| *pixel == DVec3::ONE), "outwards from {name}: something is in the way");
         // With the near plane itself on the boundary, rounding decides on which side a ray begins. It is one of the two.
         let mut scene = seen_through(cube(), start - inwards * 0.25, start);
         scene.camera.near_clip = 0.25;
         let either = images::average(&images::on_device(&scenes::pack(&scene, 1), 64)).x;
         let possible = |found: f64| found > 0.95 * (-way).exp() && found <= 1.0;
-        assert!(possible(either), "near plane on a {name}: {either}");
+        assert!(possible(either), "near plane on {name}: {either}");
         assert!(!possible(0.9 * (-way).exp()) && !possible(f64::NAN), "the comparison is blind");
     }
 }
