@@ -89,8 +89,13 @@ fn elementary_functions() {
         } else {
             [0; 2].map(|_| random.log_between(1e-9, 1e9) * if random.unit() < 0.5 { 1.0 } else { -1.0 })
         };
-        let small = if k < 300 { u } else { random.between(-0.5 * PI, 0.5 * PI) };
-        inputs.extend([vec4(&[u, x, y, x_of_angle]), vec4(&n.extend(small).to_array())]);
+        // Of 1 − exp(−z) and −log(1 − z): tiny, at the borders of the series, and up to the last number below 1.
+        let z = match k {
+            0..8 => [0.0, 1e-37, 0.029_999_999, 0.03, 0.499_999_97, 0.5, 1.0 - 1.0 / 16_777_216.0, 1e30][k],
+            _ if k % 3 == 0 => u,
+            _ => random.log_between(1e-30, 100.0),
+        };
+        inputs.extend([vec4(&[u, x, y, x_of_angle]), vec4(&[n.x, n.y, n.z, z])]);
     }
     let outputs: Vec<[f32; 4]> = run("math", &inputs, &[], inputs.len() / 2, inputs.len() / 2 * 3);
     let mut log = comparison("minus_log_1m");
@@ -98,6 +103,8 @@ fn elementary_functions() {
     let mut frame = comparison("orthonormal_frame");
     let mut angle = comparison("arctan2");
     let mut sine = comparison("sine");
+    let mut ended = comparison("one_minus_exp_minus");
+    let mut small_log = comparison("minus_log_1m_small");
     for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
         let [u, x] = [input[0][0], input[0][1]].map(f64::from);
         log.scalar(u, output[0][0], math::minus_log_1m(u));
@@ -105,7 +112,13 @@ fn elementary_functions() {
         exp.scalar(x, output[0][1], math::exp_minus(x));
         let [y, x_of_angle] = [input[0][2], input[0][3]].map(f64::from);
         angle.scalar(format!("{y}, {x_of_angle}"), output[0][2], math::arctan2(y, x_of_angle));
-        sine.scalar(input[1][3], output[0][3], math::sine(f64::from(input[1][3])));
+        let clamped = input[0][2].clamp(-1.570_796_3, 1.570_796_3);
+        sine.scalar(clamped, output[2][3], math::sine(f64::from(clamped)));
+        let z = f64::from(input[1][3]);
+        ended.scalar(z, output[0][3], math::one_minus_exp_minus(z));
+        if z < 1.0 {
+            small_log.scalar(z, output[1][3], math::minus_log_1m(z));
+        }
         let n = widen(&input[1][..3]);
         let (tangent, bitangent) = math::orthonormal_frame(n);
         frame.vector(n, &output[1][..3], tangent);
@@ -116,6 +129,8 @@ fn elementary_functions() {
     exp.finish();
     angle.finish();
     sine.finish();
+    ended.finish();
+    small_log.finish();
     frame.finish();
 }
 
@@ -160,7 +175,7 @@ fn media() {
         let sigma = [0; 3].map(|_| if random.unit() < 0.1 { 0.0 } else { random.log_between(1e-6, 1e6) });
         let sigma = if sigma[(3 - k % 3) % 3] == 0.0 { [1.0; 3] } else { sigma };
         let albedo = [random.unit(), random.unit(), 1.0];
-        inputs.push(vec4(&[u, math::minus_log_1m(u), if k % 50 == 0 { 0.0 } else { depth }]));
+        inputs.push(vec4(&[u, math::minus_log_1m(u), if k % 50 == 0 { 0.0 } else { depth }, (k % 40) as f64]));
         let mut vectors = [vec4(&throughput.to_array()), vec4(&tau), vec4(&sigma), vec4(&albedo)];
         // A share, a way that is short in the densest channel, whether the flight ended there, and a number.
         let way = random.unit() * 3.0 / (1e-3 + sigma.into_iter().fold(0.0, f64::max));
@@ -192,6 +207,13 @@ fn media() {
         emitting_rgb.vector(&case, &output[4][..3], rgb);
         let gray = medium::emitting_length(share, sigma_t.x, way, ended && sigma_t.x > 0.0);
         emitting.scalar(&case, output[4][3], gray);
+        // Crossings in any order lead to the medium that they lead to, and what leads nowhere is no medium.
+        let index = input[0][3] as u32;
+        let [code, next, last] = [0, 1, 2].map(|step| medium::medium_code(index + step));
+        assert_eq!([output[1][3], output[2][3]], [(code >> 16) as f32, (code & 0xffff) as f32], "code of {index}");
+        assert_eq!((output[0][3], medium::medium_of_code(code, index + 1, index + 1)), (index as f32, index));
+        let nowhere = code.wrapping_add(next).wrapping_sub(last);
+        assert_eq!((output[3][3], medium::medium_of_code(nowhere, index, index + 3)), (u32::MAX as f32, u32::MAX));
     }
     assert!(outputs.iter().flatten().all(|number| number.abs() <= INFINITE_DISTANCE), "a weight is not finite");
     [weights, flight, probability, survival, scatter, emitting, emitting_rgb].into_iter().for_each(Comparison::finish);

@@ -186,7 +186,8 @@ LightSample sample_sphere_light(Light light, vec3 point, vec2 u) {
     float along = dot(to_center, result.direction);
     vec3 closest = to_center - along * result.direction;
     float half_chord = sqrt(max(radius * radius - dot(closest, closest), 0.0));
-    result.distance = inside ? along + half_chord : along - half_chord;
+    // From a point of the sphere itself, rounding may find it behind.
+    result.distance = max(inside ? along + half_chord : along - half_chord, 0.0);
     result.weight = light.radiance / result.pdf;
     return result;
 }

@@ -35,9 +35,10 @@ vec3 exp_minus(vec3 x) {
     return vec3(exp_minus(x.x), exp_minus(x.y), exp_minus(x.z));
 }
 
-// 1 - exp(-x) for x >= 0, with a relative error below 3e-7: Taylor's polynomial where the difference would cancel.
+// 1 - exp(-x) for x >= 0, with a relative error below 4e-7: Taylor's polynomial where the difference would cancel.
 float one_minus_exp_minus(float x) {
-    float series = x * (1.0 - x * (0.5 - x * (0.16666667 - x * (0.041666668 - x * (0.0083333338 - x * 0.0013888889)))));
+    float tail = 0.0013888889 - x * (0.0001984127 - x * 0.0000248015873);
+    float series = x * (1.0 - x * (0.5 - x * (0.16666667 - x * (0.041666668 - x * (0.0083333338 - x * tail)))));
     return x < 0.5 ? series : 1.0 - exp_minus(x);
 }
 

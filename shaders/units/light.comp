@@ -1,4 +1,4 @@
-// Unit kernel of lib/light.glsl: (point, v), (u, which light, 0, 0) in; (direction, distance), (weight, density), and
+// Unit kernel of lib/light.glsl: (point, v), (u, which light, u of the distance to an emitting medium, 0) in; (direction, distance), (weight, density), and
 // (density asked for by what the light is, line of the alias table, rescaled number, whether the line is kept) out.
 #version 460
 #include "lib/layout.glsl"
@@ -25,6 +25,9 @@ void main() {
         found = sample_spot_light(light, point);
     } else if (light.kind == LIGHT_DIRECTIONAL) {
         found = sample_directional_light(light);
+    } else if (light.kind == LIGHT_VOLUME) {
+        found = sample_volume_light(light, point, u, inputs[2u * i + 1u].z);
+        pdf = volume_light_pdf(light, point, found.direction);
     } else if (light.kind == LIGHT_SPHERE) {
         found = sample_sphere_light(light, point, u);
         pdf = sphere_light_pdf(light.edge_1.x, distance(point, light.origin));

@@ -1,4 +1,5 @@
-// Unit kernel of lib/math.glsl: (u, x of exp, y and x of arctan2), (unit vector, x of sine) in; (-log(1 - u), exp(-x), arctan2(y, x), sine(x)), tangent, bitangent out.
+// Unit kernel of lib/math.glsl: (u, x of exp, y and x of arctan2), (unit vector, z) in; (-log(1 - u), exp(-x), arctan2(y, x),
+// 1 - exp(-z)), (tangent, -log(1 - z) for z below 1, else 0), (bitangent, sine of y clamped to [-pi/2, pi/2]) out.
 #version 460
 #include "lib/math.glsl"
 
@@ -11,8 +12,9 @@ void main() {
     if (i < uint(inputs.length()) / 2u) {
         vec3 tangent, bitangent;
         orthonormal_frame(inputs[2u * i + 1u].xyz, tangent, bitangent);
-        outputs[3u * i] = vec4(minus_log_1m(inputs[2u * i].x), exp_minus(inputs[2u * i].y), arctan2(inputs[2u * i].z, inputs[2u * i].w), sine(inputs[2u * i + 1u].w));
-        outputs[3u * i + 1u] = vec4(tangent, 0.0);
-        outputs[3u * i + 2u] = vec4(bitangent, 0.0);
+        float z = inputs[2u * i + 1u].w;
+        outputs[3u * i] = vec4(minus_log_1m(inputs[2u * i].x), exp_minus(inputs[2u * i].y), arctan2(inputs[2u * i].z, inputs[2u * i].w), one_minus_exp_minus(z));
+        outputs[3u * i + 1u] = vec4(tangent, z < 1.0 ? minus_log_1m_small(z) : 0.0);
+        outputs[3u * i + 2u] = vec4(bitangent, sine(clamp(inputs[2u * i].z, -1.5707963, 1.5707963)));
     }
 }

@@ -206,7 +206,8 @@ pub fn sample_sphere_light(light: &Light, point: DVec3, u: DVec2) -> LightSample
     let along = to_center.dot(direction);
     let closest = to_center - along * direction;
     let half_chord = (radius * radius - closest.dot(closest)).max(0.0).sqrt();
-    let distance = if inside { along + half_chord } else { along - half_chord };
+    // From a point of the sphere itself, rounding may find it behind.
+    let distance = if inside { along + half_chord } else { along - half_chord }.max(0.0);
     LightSample { direction, distance, weight: light.radiance / pdf, pdf }
 }
 

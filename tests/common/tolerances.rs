@@ -9,6 +9,8 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "exp_minus", relative: 3e-7, absolute: 2e-38 },
     Tolerance { function: "sine", relative: 2e-7, absolute: 1e-37 },
     Tolerance { function: "arctan2", relative: 3e-7, absolute: 1e-37 },
+    Tolerance { function: "one_minus_exp_minus", relative: 4e-7, absolute: 0.0 },
+    Tolerance { function: "minus_log_1m_small", relative: 1.5e-6, absolute: 0.0 },
     Tolerance { function: "orthonormal_frame", relative: 3e-7, absolute: 0.0 },
     Tolerance { function: "square_to_sphere", relative: 2e-6, absolute: 0.0 },
     Tolerance { function: "square_to_cosine_hemisphere", relative: 2e-6, absolute: 0.0 },
@@ -64,6 +66,14 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "sky radiance", relative: 2e-5, absolute: 0.0 },
     Tolerance { function: "sky pdf", relative: 1e-7, absolute: 0.0 },
     Tolerance { function: "alias rescaled", relative: 0.0, absolute: 1e-5 },
+    Tolerance { function: "volume light direction", relative: 5e-7, absolute: 0.0 },
+    Tolerance { function: "volume light distance", relative: 5e-6, absolute: 0.0 },
+    Tolerance { function: "volume light weight", relative: 1e-5, absolute: 0.0 },
+    Tolerance { function: "volume_light_pdf", relative: 1e-6, absolute: 0.0 },
+    Tolerance { function: "equiangular distance", relative: 1e-6, absolute: 0.0 },
+    Tolerance { function: "equiangular angle", relative: 1e-6, absolute: 0.0 },
+    Tolerance { function: "equiangular rank", relative: 0.0, absolute: 2e-6 },
+    Tolerance { function: "equiangular_pdf", relative: 2e-6, absolute: 0.0 },
     Tolerance { function: "camera_direction", relative: 3e-7, absolute: 0.0 },
 ];
 
