@@ -26,6 +26,12 @@ pub fn tolerance(row: &Row, expected: f64) -> f64 {
     (10.0 * unit * expected).max(unit)
 }
 
+/// The cosines of table A2 that this run tests, with their places in the table's lists: every second one, or all.
+pub fn cosines_of_check() -> impl Iterator<Item = (usize, f64)> {
+    let step = if full() { 1 } else { 2 };
+    [1.0, 0.9, 0.7, 0.5, 0.3, 0.1].into_iter().enumerate().step_by(step)
+}
+
 /// The rows of `tests/truth/{name}.json`.
 pub fn table(name: &str) -> Vec<Row> {
     let path = format!("{}/tests/truth/{name}.json", env!("CARGO_MANIFEST_DIR"));
