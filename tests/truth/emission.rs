@@ -128,11 +128,12 @@ fn glowing_slabs() {
 #[test]
 fn the_wrong_glow_is_rejected() {
     let ball = balls().into_iter().find(|row| row.id == "D:1:0.8").expect("a core row");
-    let mut weaker = glowing_ball(&ball, 0.97);
+    let mut weaker = glowing_ball(&ball, 0.93);
     weaker.name += " wrong";
     let glass = slabs_that_absorb().into_iter().find(|row| row.number("n") > 1.0).expect("a core row");
     let mut no_square = glowing_slab(&glass, |n| n);
     no_square.truncate(1);
+    no_square[0].name += " wrong";
     must_reject(&[weaker]);
     must_reject(&no_square);
 }

@@ -5,7 +5,7 @@
 use crate::CASES;
 use crate::common::scenes::{self, v};
 use crate::common::trial::{Case, judge, must_reject};
-use crate::common::truth::{Row, cosines_of_check, rows, tolerance};
+use crate::common::truth::{Row, cosines_of_check, full, rows, tolerance};
 use glam::{DMat4, DVec3};
 use tyndall::scene::{Bsdf, Light, Scene, Shape};
 
@@ -131,24 +131,30 @@ fn both(row: &Row, slab: Slab, names: [&str; 2], view: impl Fn() -> Scene) -> [C
         .unwrap_or_else(|_| unreachable!("there are two"))
 }
 
-fn totals(table: &str) -> Vec<Case> {
+/// All outputs of the rows. Of every `step`-th of them alone where not all rows are tested: then slabs in which paths are long are left
+/// out, and diffuse light is left to every third row that remains.
+fn totals(table: &str, step: usize) -> Vec<Case> {
     let mut cases = Vec::new();
-    for row in rows(table) {
+    let long = |row: &Row| row.number("tau") >= 5.0 && row.number("albedo") > 0.95;
+    let tested = rows(table).into_iter().step_by(if full() { 1 } else { step }).filter(|row| full() || !long(row));
+    for (index, row) in tested.enumerate() {
         let slab = Slab::of(&row);
         cases.extend(both(&row, slab, ["R_coll", "T_coll"], || slab.at_cosine(1.0)));
-        cases.extend(both(&row, slab, ["R_diff", "T_diff"], || slab.mean_of_directions()));
+        if full() || index % 3 == 0 {
+            cases.extend(both(&row, slab, ["R_diff", "T_diff"], || slab.mean_of_directions()));
+        }
     }
     cases
 }
 
 #[test]
 fn slabs_without_surfaces() {
-    judge("A", &totals("A"), CASES);
+    judge("A", &totals("A", 2), CASES);
 }
 
 #[test]
 fn slabs_of_glass() {
-    judge("B", &totals("B"), CASES);
+    judge("B", &totals("B", 1), CASES);
 }
 
 #[test]
