@@ -112,7 +112,7 @@ fn roulette_takes_nothing_away() {
                 scene.integrator.rr_depth = rr_depth;
                 let gray = albedo.x == albedo.y;
                 let name = format!("index {index}, roulette from {rr_depth} on, gray {gray}");
-                judge(&name, &scene, 2048, if gray { &[0] } else { &[0, 1, 2] });
+                judge(&name, &scene, 1024, if gray { &[0] } else { &[0, 1, 2] });
             }
         }
     }
