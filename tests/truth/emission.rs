@@ -3,7 +3,7 @@
 use crate::CASES;
 use crate::common::scenes::{self, v};
 use crate::common::trial::{Case, judge, must_reject};
-use crate::common::truth::{Row, cosines_of_check, full, rows, tolerance};
+use crate::common::truth::{Row, cosines_of_check, rows, tolerance, whole};
 use crate::slabs::Slab;
 use glam::DVec3;
 use tyndall::scene::{Light, Medium, Phase, Scene, Shape};
@@ -32,7 +32,7 @@ fn through_ball(medium: Medium, diameter: f64, distance: f64) -> Scene {
 fn along_a_path(row: &Row, scene: &Scene) -> Vec<Case> {
     let (expected, error) = row.output("L");
     let turn = row.id.bytes().last().map_or(0, usize::from) % expected.len();
-    let tested = expected.iter().enumerate().filter(|(channel, _)| full() || *channel == turn);
+    let tested = expected.iter().enumerate().filter(|(channel, _)| whole() || *channel == turn);
     let cases = tested.map(|(channel, &expected)| Case {
         name: format!("{} channel {channel}", row.id),
         views: vec![(1.0, scene.clone())],
