@@ -10,7 +10,7 @@
 
 use super::images::batches;
 use super::statistics::{chi_squared_tail, mean_and_error, sidak_bound};
-use super::truth::full;
+use super::truth::{full, picked};
 use std::fmt::Write;
 use std::time::Instant;
 use tyndall::scene::Scene;
@@ -219,8 +219,11 @@ pub fn judge(table: &str, cases: &[Case], of_the_run: usize) {
     record(table, &line);
 }
 
-/// Writes a line of the table of results to `target/truth`.
+/// Writes a line of the table of results to `target/truth`, unless rows were picked.
 pub fn record(table: &str, line: &str) {
+    if picked().is_some() {
+        return;
+    }
     let folder = format!("{}/target/truth/{}", env!("CARGO_MANIFEST_DIR"), if full() { "full" } else { "core" });
     std::fs::create_dir_all(&folder).expect("the folder of results can be made");
     std::fs::write(format!("{folder}/{}.md", table.replace(' ', "_")), line).expect("the result can be written");
