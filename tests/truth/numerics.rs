@@ -114,8 +114,8 @@ fn slabs_at_the_edge_of_what_can_be_resolved() {
         let slab = Slab { scale: row.number("scale"), half_width: 50.0 * 1.7, ..Slab::new(1.7, 0.87, 0.6, 1.0) };
         cases.extend(reflected_and_transmitted(&row, slab, 5e-3));
     }
-    // Paths of tens of thousands of events take their time.
-    for row in kind("extreme_slab").into_iter().filter(|row| full() || row.number("tau") < 5e3) {
+    // Paths of thousands of events take their time.
+    for row in kind("extreme_slab").into_iter().filter(|row| full() || row.number("tau") < 1.0) {
         cases.extend(reflected_and_transmitted(&row, Slab::of(&row), 2e-2));
     }
     for row in kind("grazing_slab") {
