@@ -1,4 +1,4 @@
-//! Images under spots, parallel light and environment maps: closed forms, furnaces, orientation.
+//! Images under spots, parallel light and environment maps: closed forms, orientation.
 
 mod common;
 
@@ -225,78 +225,6 @@ fn an_image_of_one_colour_is_a_constant_light() {
     };
     assert!(z(1.0).abs() < 4.0, "z = {}", z(1.0));
     assert!(z(1.01).abs() > 4.0, "blind: z = {} at 1 %", z(1.01));
-}
-
-/// Two maps that add up to 1 everywhere, with random pixels and a sun.
-fn complements() -> [Arc<Bitmap>; 2] {
-    let mut random = Random(92);
-    let mut pixels: Vec<f64> = (0..24 * 13).map(|_| random.unit()).collect();
-    pixels[4 * 24 + 7] = 1.0;
-    let one = scenes::sky(24, 13, |x, y| DVec3::splat(pixels[y * 24 + x]));
-    let other = Arc::new(one.map(|pixel| pixel.map(|value| 1.0 - value)));
-    [one, other]
-}
-
-#[test]
-fn furnaces_under_images() {
-    // What absorbs nothing is invisible where the radiance is 1 from all directions: a pixel reads 1 within three standard
-    // errors, of at most 1e-3.
-    let check_furnace = |batches: &[f64]| {
-        let (mean, error) = mean_and_error(batches);
-        let right = error <= 1e-3 && (mean - 1.0).abs() <= 3.0 * error + 1e-5;
-        if right { Ok(()) } else { Err(format!("{mean:.6} ± {error:.1e}")) }
-    };
-    let empty = || scenes::one_ray(v(0.3, 0.2, 4.0), v(0.3, 0.2, 0.0), 16);
-    let haze = || {
-        let mut scene = empty();
-        let medium = scene.add_medium(scenes::gray(3.0, 1.0, 0.6));
-        scene.shapes.push(Shape::boundary("haze", scenes::ball(DVec3::ZERO, 1.0), medium));
-        scene
-    };
-    let glass = || {
-        let mut scene = empty();
-        let mut ball = Shape::diffuse("filled glass", scenes::ball(DVec3::ZERO, 1.0), DVec3::ZERO);
-        ball.bsdf = Bsdf::Dielectric {
-            int_ior: 1.5,
-            ext_ior: 1.0,
-            specular_reflectance: DVec3::ONE.into(),
-            specular_transmittance: DVec3::ONE.into(),
-        };
-        let medium = scene.add_medium(scenes::gray(1.0, 1.0, 0.5));
-        ball.boundary = Some(tyndall::scene::Boundary { interior: Some(medium), exterior: None });
-        scene.shapes.push(ball);
-        scene
-    };
-    let mut white = empty();
-    white.shapes.push(Shape::diffuse("white", scenes::ball(DVec3::ZERO, 1.0), DVec3::ONE));
-    white.shapes.push(Shape::diffuse("also white", scenes::ball(v(1.5, 0.0, 0.5), 0.8), DVec3::ONE));
-    let [one, other] = complements();
-    let sky = |bitmap: &Arc<Bitmap>| Light::Envmap {
-        bitmap: bitmap.clone(),
-        scale: 1.0,
-        to_world: DMat3::from_rotation_x(0.7),
-    };
-    let flat = scenes::sky(5, 4, |_, _| DVec3::ONE);
-    let half = Light::Constant { radiance: DVec3::splat(0.5) };
-    let gray = Light::Envmap { bitmap: flat.clone(), scale: 0.25, to_world: DMat3::IDENTITY };
-    let skies = [
-        ("one image", vec![sky(&flat)]),
-        ("two images", vec![sky(&one), sky(&other)]),
-        ("a constant and two images", vec![half, gray.clone(), gray]),
-    ];
-    let bodies = [("haze", haze(), &skies[..]), ("glass", glass(), &skies[1..2]), ("white", white, &skies[1..2])];
-    let mut seed = 0;
-    for (body, scene, skies) in &bodies {
-        for (sky, lights) in *skies {
-            seed += 1;
-            let mut scene = scene.clone();
-            scene.lights = lights.clone();
-            let batches = channel(&images::batches(&scene, seed, 2048), 0);
-            check_furnace(&batches).unwrap_or_else(|why| panic!("{body} under {sky}: {why}"));
-            let darker: Vec<f64> = batches.iter().map(|batch| batch * 0.98).collect();
-            check_furnace(&darker).expect_err("a furnace that loses 2 %");
-        }
-    }
 }
 
 #[test]

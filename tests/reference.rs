@@ -1,13 +1,12 @@
-//! Images: the device against the reference, and furnaces.
+//! Images: the device against the reference.
 
 mod common;
 
 use common::scenes::v;
-use common::statistics::mean_and_error;
 use common::{device, images, scenes};
-use glam::{DMat4, DVec3};
+use glam::DVec3;
 use tyndall::gpu::shader::Variant;
-use tyndall::scene::{Camera, Film, Light, Scene, Shape};
+use tyndall::scene::{Camera, Film, Light, Scene};
 
 #[test]
 fn device_and_reference_follow_the_same_paths() {
@@ -64,51 +63,6 @@ fn the_comparison_rejects_a_brighter_image_and_the_wrong_sign_of_g() {
     let mut flipped = packed.clone();
     flipped.media.iter_mut().for_each(|medium| medium.g = -medium.g);
     images::compare(&right, &images::by_reference(&flipped, 16)).expect_err("scattering in the wrong direction");
-}
-
-fn red(batches: &[DVec3]) -> Vec<f64> {
-    batches.iter().map(|batch| batch.x).collect()
-}
-
-/// Whether an estimate of 1 is 1: within three standard errors, of at most 1e-3.
-fn check_furnace(batches: &[f64]) -> Result<String, String> {
-    let (mean, error) = mean_and_error(batches);
-    let result = format!("{mean:.6} ± {error:.1e}");
-    let right = error <= 1e-3 && (mean - 1.0).abs() <= 3.0 * error + 1e-5;
-    if right { Ok(result) } else { Err(result) }
-}
-
-#[test]
-fn a_medium_that_absorbs_nothing_is_invisible_in_a_furnace() {
-    // The furnaces of table D (all but the one of a grid), and forward scattering at the edge of what can be resolved.
-    let cube = |side: f64| scenes::cuboid(DMat4::from_scale(DVec3::splat(side / 2.0)));
-    let mut nested = scenes::furnace(cube(2.0), 1.0, 0.3);
-    let inner = nested.add_medium(scenes::gray(2.0, 1.0, 0.3));
-    nested.shapes.push(Shape::boundary("inner", scenes::ball(v(0.2, 0.1, 0.0), 0.5), inner));
-    let cases = [
-        ("D:furnace0", scenes::furnace(cube(1.0), 1.0, 0.0)),
-        ("D:furnace1", scenes::furnace(cube(1.0), 20.0, 0.9)),
-        ("D:furnace2", scenes::furnace(scenes::ball(DVec3::ZERO, 1.0), 3.0, -0.9)),
-        ("D:furnace3", scenes::furnace(scenes::torus(1.0, 0.4), 5.0, 0.5)),
-        ("D:furnace4", nested),
-        ("isotropic", scenes::furnace(scenes::ball(DVec3::ZERO, 1.0), 3.0, 0.0)),
-        ("forward", scenes::furnace(scenes::ball(DVec3::ZERO, 1.0), 3.0, 0.9)),
-        ("backward", scenes::furnace(scenes::ball(DVec3::ZERO, 1.0), 3.0, -0.5)),
-        ("nearly straight on", scenes::furnace(scenes::ball(DVec3::ZERO, 1.0), 4.0, 0.9999)),
-    ];
-    for (seed, (name, mut scene)) in (1..).zip(cases) {
-        // On the medium alone: the background is 1 anyway.
-        scene.camera.fov_x = 8.0;
-        if name == "D:furnace3" {
-            scene.camera = Camera::look_at(v(2.0, 3.0, 2.0), v(1.0, 0.0, 0.0), DVec3::Y, 8.0);
-        }
-        scene.film = Film::new(16, 16);
-        let batches = red(&images::batches(&scene, seed, 2048));
-        let result = check_furnace(&batches).unwrap_or_else(|why| panic!("{name}: {why}"));
-        eprintln!("{name}: {result}");
-        let darker: Vec<f64> = batches.iter().map(|batch| batch * 0.98).collect();
-        check_furnace(&darker).expect_err("a furnace that loses 2 %");
-    }
 }
 
 #[test]

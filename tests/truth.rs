@@ -8,6 +8,10 @@ mod common;
 
 #[path = "truth/absorption.rs"]
 mod absorption;
+#[path = "truth/beams.rs"]
+mod beams;
+#[path = "truth/emission.rs"]
+mod emission;
 #[path = "truth/numerics.rs"]
 mod numerics;
 #[path = "truth/point_source.rs"]

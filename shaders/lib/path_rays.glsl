@@ -64,8 +64,6 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
             uint inside = media & 0xffffu, outside = media >> 16u;
             hit.medium += along_normal ? outside - inside : inside - outside;
         }
-        // The light itself is not in the way of its light.
-        hit.blocked = hit.blocked || (counts && !boundary && primitive.light != path.light + 1u);
     } else if (begins && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE))) {
         hit.t = t;
         hit.primitive = index;

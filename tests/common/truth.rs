@@ -14,9 +14,20 @@ pub fn full() -> bool {
     std::env::var_os("TYNDALL_FULL").is_some_and(|value| !value.is_empty())
 }
 
-/// The rows of a table that this run tests.
+/// The rows of a table that this run tests. `TYNDALL_ROWS` picks those whose name begins with it, to look at a few of them again.
 pub fn rows(name: &str) -> Vec<Row> {
-    table(name).into_iter().filter(|row| full() || row.core()).collect()
+    let wanted = picked().unwrap_or_default();
+    table(name).into_iter().filter(|row| (full() || row.core()) && row.id.starts_with(&wanted)).collect()
+}
+
+/// What the names of the rows to be tested begin with, where somebody picks them.
+pub fn picked() -> Option<String> {
+    std::env::var("TYNDALL_ROWS").ok()
+}
+
+/// Whether nothing of the rows is left out to save time.
+pub fn whole() -> bool {
+    full() || picked().is_some()
 }
 
 /// The bias worth catching: relative to what is expected, but no less than an absolute one. Half a per cent and 5e-4 for the
@@ -24,6 +35,12 @@ pub fn rows(name: &str) -> Vec<Row> {
 pub fn tolerance(row: &Row, expected: f64) -> f64 {
     let unit = if full() && row.core() { 5e-4 } else { 1e-3 };
     (10.0 * unit * expected).max(unit)
+}
+
+/// The cosines of table A2 that this run tests, with their places in the table's lists: all, or one steep and one flat.
+pub fn cosines_of_check() -> impl Iterator<Item = (usize, f64)> {
+    let (first, step) = if whole() { (0, 1) } else { (1, 3) };
+    [1.0, 0.9, 0.7, 0.5, 0.3, 0.1].into_iter().enumerate().skip(first).step_by(step)
 }
 
 /// The rows of `tests/truth/{name}.json`.

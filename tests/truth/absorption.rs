@@ -4,7 +4,7 @@ use crate::CASES;
 use crate::common::images;
 use crate::common::scenes::{self, v};
 use crate::common::trial::{Case, judge, record};
-use crate::common::truth::{Row, rows};
+use crate::common::truth::{Row, rows, whole};
 use glam::{DMat4, DVec3};
 use tyndall::scene::{Geometry, Light, Medium, Phase, Shape};
 
@@ -95,15 +95,17 @@ fn placed(row: &Row) -> Vec<(&'static str, Geometry, DVec3, DVec3)> {
 #[test]
 fn absorption_along_camera_rays() {
     let mut cases = Vec::new();
-    for row in rows("C") {
+    for (index, row) in rows("C").into_iter().enumerate() {
         let behind = row.vector("L_behind");
         let (expected, error) = row.output("L");
-        for (name, geometry, origin, direction) in placed(&row) {
+        for (place, (name, geometry, origin, direction)) in placed(&row).into_iter().enumerate() {
             let mut scene = scenes::one_ray(origin, origin + direction, 16);
             let medium = scene.add_medium(absorber(&row));
             scene.shapes.push(Shape::boundary("absorber", geometry, medium));
             scene.lights.push(Light::Constant { radiance: behind });
-            for (channel, &expected) in expected.iter().enumerate() {
+            // Without a full run the channels take turns.
+            let tested = |channel: usize| whole() || (index + place) % 3 == channel;
+            for (channel, &expected) in expected.iter().enumerate().filter(|(channel, _)| tested(*channel)) {
                 // A flight's channel is chosen, so that some samples resolve a transmittance however small it is. The table's
                 // error is absolute; what a deep transmittance has of it is far below its own rounding here.
                 cases.push(Case {

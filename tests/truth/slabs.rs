@@ -5,7 +5,7 @@
 use crate::CASES;
 use crate::common::scenes::{self, v};
 use crate::common::trial::{Case, judge, must_reject};
-use crate::common::truth::{Row, rows, tolerance};
+use crate::common::truth::{Row, cosines_of_check, rows, tolerance, whole};
 use glam::{DMat4, DVec3};
 use tyndall::scene::{Bsdf, Light, Scene, Shape};
 
@@ -76,7 +76,12 @@ impl Slab {
 
     /// The slab seen at a cosine to its normal.
     pub fn at_cosine(&self, mu: f64) -> Scene {
-        let back = v((1.0 - mu * mu).max(0.0).sqrt() * 0.8, (1.0 - mu * mu).max(0.0).sqrt() * 0.6, mu);
+        let sin = (1.0 - mu * mu).max(0.0).sqrt();
+        self.seen_along(v(sin * 0.8, sin * 0.6, mu))
+    }
+
+    /// The slab seen from above by light that leaves it along a unit vector.
+    pub fn seen_along(&self, back: DVec3) -> Scene {
         self.seen(self.target() + back * self.clearance(), self.target())
     }
 
@@ -126,34 +131,43 @@ fn both(row: &Row, slab: Slab, names: [&str; 2], view: impl Fn() -> Scene) -> [C
         .unwrap_or_else(|_| unreachable!("there are two"))
 }
 
-fn totals(table: &str) -> Vec<Case> {
+/// All outputs of the rows. In a run that leaves something out only of every `step`-th row, without slabs in which paths are long; diffuse
+/// light, in which estimates are noisy, is then left to every third row of the thinner ones.
+fn totals(table: &str, step: usize) -> Vec<Case> {
     let mut cases = Vec::new();
-    for row in rows(table) {
+    let thick = |row: &Row| row.number("tau") >= 5.0;
+    let long = |row: &Row| thick(row) && row.number("albedo") > 0.95;
+    let tested = rows(table).into_iter().step_by(if whole() { 1 } else { step }).filter(|row| whole() || !long(row));
+    for (index, row) in tested.enumerate() {
         let slab = Slab::of(&row);
         cases.extend(both(&row, slab, ["R_coll", "T_coll"], || slab.at_cosine(1.0)));
-        cases.extend(both(&row, slab, ["R_diff", "T_diff"], || slab.mean_of_directions()));
+        if whole() || (index % 3 == 0 && !thick(&row)) {
+            cases.extend(both(&row, slab, ["R_diff", "T_diff"], || slab.mean_of_directions()));
+        }
     }
     cases
 }
 
 #[test]
 fn slabs_without_surfaces() {
-    judge("A", &totals("A"), CASES);
+    judge("A", &totals("A", 2), CASES);
 }
 
 #[test]
 fn slabs_of_glass() {
-    judge("B", &totals("B"), CASES);
+    judge("B", &totals("B", 1), CASES);
 }
 
+/// In a run that leaves something out, what comes back is looked at from the side and what gets through from above.
 #[test]
 fn slabs_seen_at_an_angle() {
     let mut cases = Vec::new();
     for row in rows("A2") {
         let slab = Slab::of(&row);
-        for (index, mu) in [1.0, 0.9, 0.7, 0.5, 0.3, 0.1].into_iter().enumerate() {
+        for (index, mu) in cosines_of_check() {
             let seen = slab.at_cosine(mu);
-            for (name, scene) in [("R_mu", slab.lit_from_above(seen.clone())), ("T_mu", slab.lit_from_below(seen))] {
+            let both = [("R_mu", slab.lit_from_above(seen.clone())), ("T_mu", slab.lit_from_below(seen))];
+            for (name, scene) in both.into_iter().filter(|(name, _)| whole() || (mu < 0.5) == (*name == "R_mu")) {
                 let (values, error) = row.output(name);
                 let tolerance = tolerance(&row, values[index]);
                 cases.push(Case::new(format!("{} {name} {mu}", row.id), scene, (values[index], error), tolerance));
