@@ -112,7 +112,7 @@ fn elementary_functions() {
         exp.scalar(x, output[0][1], math::exp_minus(x));
         let [y, x_of_angle] = [input[0][2], input[0][3]].map(f64::from);
         angle.scalar(format!("{y}, {x_of_angle}"), output[0][2], math::arctan2(y, x_of_angle));
-        let clamped = input[0][2].clamp(-1.570_796_3, 1.570_796_3);
+        let clamped = input[0][2].clamp(-1.5, 1.5);
         sine.scalar(clamped, output[2][3], math::sine(f64::from(clamped)));
         let z = f64::from(input[1][3]);
         ended.scalar(z, output[0][3], math::one_minus_exp_minus(z));

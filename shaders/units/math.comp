@@ -1,5 +1,5 @@
 // Unit kernel of lib/math.glsl: (u, x of exp, y and x of arctan2), (unit vector, z) in; (-log(1 - u), exp(-x), arctan2(y, x),
-// 1 - exp(-z)), (tangent, -log(1 - z) for z below 1, else 0), (bitangent, sine of y clamped to [-pi/2, pi/2]) out.
+// 1 - exp(-z)), (tangent, -log(1 - z) for z below 1, else 0), (bitangent, sine of y clamped to [-1.5, 1.5]) out.
 #version 460
 #include "lib/math.glsl"
 
@@ -15,6 +15,6 @@ void main() {
         float z = inputs[2u * i + 1u].w;
         outputs[3u * i] = vec4(minus_log_1m(inputs[2u * i].x), exp_minus(inputs[2u * i].y), arctan2(inputs[2u * i].z, inputs[2u * i].w), one_minus_exp_minus(z));
         outputs[3u * i + 1u] = vec4(tangent, z < 1.0 ? minus_log_1m_small(z) : 0.0);
-        outputs[3u * i + 2u] = vec4(bitangent, sine(clamp(inputs[2u * i].z, -1.5707963, 1.5707963)));
+        outputs[3u * i + 2u] = vec4(bitangent, sine(clamp(inputs[2u * i].z, -1.5, 1.5)));
     }
 }

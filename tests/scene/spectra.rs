@@ -161,7 +161,7 @@ fn errors() {
             "temperature is 0 K; it must be greater than 0",
         ),
         (
-            r#"<spectrum name="radiance" type="uniform"><float name="valu" value="1"/></spectrum>"#,
+            r#"<spectrum name="radiance" type="uniform"><float name="valued" value="1"/></spectrum>"#,
             "did you mean \"value\"?",
         ),
         (
