@@ -7,7 +7,7 @@ use common::scenes::{self, v};
 use common::statistics::{mean_and_error, sidak_bound};
 use glam::{DMat4, DVec3};
 use tyndall::pack::{PackError, Packed};
-use tyndall::scene::{Bsdf, Film, Medium, Phase, Scene, Shape};
+use tyndall::scene::{Bsdf, Film, Medium, Phase, Shape};
 
 /// A medium that emits what it would in equilibrium with radiance 1, `sigma_a`.
 fn warm(sigma_t: DVec3, albedo: DVec3, phase: Phase) -> Medium {
@@ -16,15 +16,6 @@ fn warm(sigma_t: DVec3, albedo: DVec3, phase: Phase) -> Medium {
 
 fn hg(g: f64) -> Phase {
     Phase::HenyeyGreenstein { g }
-}
-
-/// A ray through the middle of a ball of some diameter, from twice as far away.
-fn through_ball(medium: Medium, diameter: f64, distance: f64) -> Scene {
-    let mut scene = scenes::one_ray(v(distance, 0.0, 2.0 * diameter), v(distance, 0.0, 0.0), 16);
-    scene.camera.near_clip = 0.0;
-    let medium = scene.add_medium(medium);
-    scene.shapes.push(Shape::boundary("ball", scenes::ball(DVec3::ZERO, diameter / 2.0), medium));
-    scene
 }
 
 #[test]
@@ -85,7 +76,7 @@ fn glow_without_end_is_refused() {
 
 #[test]
 fn hidden_emitters_hide_a_glow_from_the_camera_alone() {
-    let mut scene = through_ball(warm(DVec3::ONE, DVec3::ZERO, Phase::Isotropic), 2.0, 0.0);
+    let mut scene = scenes::through_ball(warm(DVec3::ONE, DVec3::ZERO, Phase::Isotropic), 2.0, 0.0);
     assert!(images::average(&images::on_device(&scenes::pack(&scene, 1), 16)).min_element() > 0.5);
     scene.integrator.hide_emitters = true;
     assert_eq!(images::average(&images::on_device(&scenes::pack(&scene, 1), 16)), DVec3::ZERO);

@@ -2,6 +2,7 @@
 
 use super::PackError;
 use super::frame::{Bounds, Frame};
+use super::nesting::volume;
 use crate::scene::{Geometry, MediumId, Scene};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -41,11 +42,8 @@ fn collision_share(tau: f64) -> f64 {
 
 /// Mean length of a chord of what a medium fills, 4 V/A (Cauchy 1841), in scene units.
 fn mean_chord(scene: &Scene, id: MediumId) -> f64 {
-    let filled = scene.shapes.iter().filter(|shape| shape.boundary.is_some_and(|both| both.interior == Some(id)));
-    let (volume, area) = filled.fold((0.0, 0.0), |(volume, area), shape| {
-        let one = volume_and_area(&shape.geometry);
-        (volume + one.0, area + one.1)
-    });
+    let volume: f64 = scene.filled_with(id).map(|shape| volume(&shape.geometry).abs()).sum();
+    let area: f64 = scene.filled_with(id).map(|shape| area(&shape.geometry)).sum();
     if area > 0.0 { 4.0 * volume / area } else { 0.0 }
 }
 
@@ -62,7 +60,7 @@ pub struct EmittingVolume {
 
 /// The volume of an emitting medium; `None` if it does not emit, or is not the interior of any shape.
 pub fn enclosing_volume(scene: &Scene, frame: &Frame, id: MediumId) -> Option<EmittingVolume> {
-    let filled = || scene.shapes.iter().filter(|shape| shape.boundary.is_some_and(|both| both.interior == Some(id)));
+    let filled = || scene.filled_with(id);
     if scene.media[id.0 as usize].emission == DVec3::ZERO || filled().next().is_none() {
         return None;
     }
@@ -79,24 +77,21 @@ pub fn enclosing_volume(scene: &Scene, frame: &Frame, id: MediumId) -> Option<Em
         }
     };
     let radius = filled().map(|shape| reach(&shape.geometry)).fold(0.0, f64::max);
-    let volume = filled().map(|shape| volume_and_area(&shape.geometry).0).sum::<f64>() * frame.scale.powi(3);
+    let volume = filled().map(|shape| volume(&shape.geometry).abs()).sum::<f64>() * frame.scale.powi(3);
     // A little larger, so that rounding leaves nothing outside.
     Some(EmittingVolume { center: frame.point(center), radius: frame.length(radius * 1.00001), volume })
 }
 
-/// Volume (by Gauss's theorem) and area of a closed surface.
-fn volume_and_area(geometry: &Geometry) -> (f64, f64) {
+/// Area of a surface.
+fn area(geometry: &Geometry) -> f64 {
     match geometry {
-        Geometry::Sphere { radius, .. } => (4.0 / 3.0 * PI * radius.powi(3), 4.0 * PI * radius.powi(2)),
+        Geometry::Sphere { radius, .. } => 4.0 * PI * radius.powi(2),
         Geometry::Mesh(mesh) => {
-            let Some(&origin) = mesh.triangles.first().map(|triangle| &mesh.positions[triangle[0] as usize]) else {
-                return (0.0, 0.0);
-            };
-            let (volume, area) = mesh.triangles.iter().fold((0.0, 0.0), |(volume, area), triangle| {
-                let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize] - origin);
-                (volume + a.dot(b.cross(c)) / 6.0, area + (b - a).cross(c - a).length() / 2.0)
+            let doubled = mesh.triangles.iter().map(|triangle| {
+                let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize]);
+                (b - a).cross(c - a).length()
             });
-            (volume.abs(), area)
+            doubled.sum::<f64>() / 2.0
         }
     }
 }
@@ -132,7 +127,8 @@ mod tests {
         let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
         let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
         let mesh = crate::scene::Mesh { positions, triangles, ..Default::default() };
-        let (volume, area) = volume_and_area(&Geometry::Mesh(mesh));
+        let cube = Geometry::Mesh(mesh);
+        let (volume, area) = (volume(&cube), area(&cube));
         assert!((volume - 27.0).abs() < 1e-9 && (area - 54.0).abs() < 1e-9, "{volume}, {area}");
     }
 }

@@ -19,12 +19,11 @@ pub fn choose_equiangular(scene: &Scene, nesting: &Nesting, frame: &Frame, light
         return;
     }
     for (index, medium) in media.iter_mut().enumerate().skip(1) {
-        let id = Some(MediumId(index as u32 - 1));
-        let mut bounds = Bounds::EMPTY;
-        let filled = scene.shapes.iter().filter(|shape| shape.boundary.is_some_and(|one| one.interior == id));
-        filled.for_each(|shape| bounds = bounds.union(Bounds::of(&shape.geometry)));
+        let id = MediumId(index as u32 - 1);
+        let filled = scene.filled_with(id);
+        let bounds = filled.fold(Bounds::EMPTY, |bounds, shape| bounds.union(Bounds::of(&shape.geometry)));
         let within = if bounds.is_empty() { 0.0 } else { f64::from(frame.length((bounds.max - bounds.min).length())) };
-        let extent = if nesting.world == id { 2.0 * frame.radius } else { within };
+        let extent = if nesting.world == Some(id) { 2.0 * frame.radius } else { within };
         let sigma_t = f64::from(medium.sigma_t.element_sum() / 3.0);
         if sigma_t > 0.0 && sigma_t * extent < THIN && medium.albedo.max_element() > 0.0 {
             medium.equiangular = SHARE;

@@ -150,8 +150,8 @@ fn probes(geometry: &Geometry) -> Vec<DVec3> {
     }
 }
 
-/// Volume within a closed surface; negative if it is inside out.
-fn volume(geometry: &Geometry) -> f64 {
+/// Volume within a closed surface (by Gauss's theorem); negative if it is inside out.
+pub fn volume(geometry: &Geometry) -> f64 {
     match geometry {
         Geometry::Sphere { radius, flipped, .. } => {
             4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) * if *flipped { -1.0 } else { 1.0 }

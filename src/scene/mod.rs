@@ -76,6 +76,11 @@ impl Scene {
         self.media.push(medium);
         MediumId(self.media.len() as u32 - 1)
     }
+
+    /// The boundaries whose interior is a medium.
+    pub fn filled_with(&self, medium: MediumId) -> impl Iterator<Item = &Shape> {
+        self.shapes.iter().filter(move |shape| shape.boundary.is_some_and(|both| both.interior == Some(medium)))
+    }
 }
 
 /// A pinhole camera with Mitsuba's conventions: camera space looks along +z, with +y up and +x to the *left*.

@@ -434,3 +434,12 @@ pub fn torus(major: f64, minor: f64) -> Geometry {
     }
     Geometry::Mesh(mesh)
 }
+
+/// A ball about the origin, along a ray that passes its centre at a distance, from two diameters away.
+pub fn through_ball(medium: Medium, diameter: f64, distance: f64) -> Scene {
+    let mut scene = one_ray(v(distance, 0.0, 2.0 * diameter), v(distance, 0.0, 0.0), 16);
+    scene.camera.near_clip = 0.0;
+    let medium = scene.add_medium(medium);
+    scene.shapes.push(Shape::boundary("ball", ball(DVec3::ZERO, diameter / 2.0), medium));
+    scene
+}

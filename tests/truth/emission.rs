@@ -1,12 +1,12 @@
 //! Media that emit (table I, and the columns of emission of tables A2, D, D2 and J).
 
 use crate::CASES;
-use crate::common::scenes::{self, v};
+use crate::common::scenes;
 use crate::common::trial::{Case, judge, must_reject};
 use crate::common::truth::{Row, cosines_of_check, rows, tolerance, whole};
 use crate::slabs::Slab;
 use glam::DVec3;
-use tyndall::scene::{Light, Medium, Phase, Scene, Shape};
+use tyndall::scene::{Light, Medium, Phase, Scene};
 
 /// A medium that absorbs and emits.
 fn glow(sigma_a: DVec3, emission: DVec3) -> Medium {
@@ -16,15 +16,6 @@ fn glow(sigma_a: DVec3, emission: DVec3) -> Medium {
 /// A medium that emits what it would in equilibrium with radiance 1: `sigma_a`.
 fn warm(sigma_t: f64, albedo: f64, g: f64) -> Medium {
     Medium { emission: DVec3::splat(sigma_t * (1.0 - albedo)), ..scenes::gray(sigma_t, albedo, g) }
-}
-
-/// A ball about the origin, along a ray that passes its centre at a distance.
-fn through_ball(medium: Medium, diameter: f64, distance: f64) -> Scene {
-    let mut scene = scenes::one_ray(v(distance, 0.0, 2.0 * diameter), v(distance, 0.0, 0.0), 16);
-    scene.camera.near_clip = 0.0;
-    let medium = scene.add_medium(medium);
-    scene.shapes.push(Shape::boundary("ball", scenes::ball(DVec3::ZERO, diameter / 2.0), medium));
-    scene
 }
 
 /// What a path through a medium without scattering sends out, a case a channel (the channels take turns where this is no full run);
@@ -51,18 +42,18 @@ fn cases_of_table_i(row: &Row) -> Vec<Case> {
         let (expected, error) = row.output("L");
         let distances = row.list("b_over_R").into_iter().zip(expected);
         let cases = distances.map(|(b, expected)| {
-            let scene = through_ball(medium.clone(), 2.0 * row.number("radius"), b * row.number("radius"));
+            let scene = scenes::through_ball(medium.clone(), 2.0 * row.number("radius"), b * row.number("radius"));
             Case::new(format!("{} {b}", row.id), scene, (expected, error), tolerance(row, expected))
         });
         return cases.collect();
     }
     if row.id.contains("sphere") {
         let medium = warm(row.number("sigma_a"), 0.0, 0.0);
-        return along_a_path(row, &through_ball(medium, 2.0 * row.number("radius"), row.number("b")));
+        return along_a_path(row, &scenes::through_ball(medium, 2.0 * row.number("radius"), row.number("b")));
     }
     let sigma_a = row.vector("sigma_a");
     let emission = if row.id.starts_with("I:q") { row.vector("q") } else { sigma_a * row.number("Le") };
-    let mut scene = through_ball(glow(sigma_a, emission), row.number("path"), 0.0);
+    let mut scene = scenes::through_ball(glow(sigma_a, emission), row.number("path"), 0.0);
     let behind = row.number("L_behind");
     if behind > 0.0 {
         scene.lights.push(Light::Constant { radiance: DVec3::splat(behind) });
@@ -80,7 +71,7 @@ fn emission_in_the_limit_of_thin_and_dense() {
     let limits = rows("J").into_iter().filter(|row| row.word("kind") == "emission_limit");
     let cases = limits.flat_map(|row| {
         let medium = glow(DVec3::splat(row.number("sigma_t")), DVec3::splat(row.number("q")));
-        along_a_path(&row, &through_ball(medium, row.number("d"), 0.0))
+        along_a_path(&row, &scenes::through_ball(medium, row.number("d"), 0.0))
     });
     judge("J, emission", &cases.collect::<Vec<_>>(), CASES);
 }
@@ -91,7 +82,7 @@ fn glowing_ball(row: &Row, strength: f64) -> Case {
     medium.emission *= strength;
     let (chord, error) = row.value("L_chord");
     let expected = 1.0 - chord;
-    let scene = through_ball(medium, 2.0, 0.0);
+    let scene = scenes::through_ball(medium, 2.0, 0.0);
     Case::new(format!("{} L_emit0", row.id), scene, (expected, error), tolerance(row, expected))
 }
 
