@@ -165,7 +165,12 @@ fn measure(path: &Path, device: &Arc<Device>, arguments: &Arguments) -> Outcome<
     }
     let mut variants = Vec::new();
     for ((set, _), features) in different {
-        let variant = Variant { features, workgroup: device.subgroup_size, buffer_reference: device.buffer_reference };
+        let variant = Variant {
+            features,
+            immediates: packed.immediates().to_vec(),
+            workgroup: device.subgroup_size,
+            buffer_reference: device.buffer_reference,
+        };
         let mut renderer = Renderer::with_variant(device, &packed, &variant)?;
         let begin = Instant::now();
         renderer.render(0..1)?;

@@ -40,14 +40,15 @@ void main() {
     bool fresh = true; // the invocation has no path yet
     [[dont_unroll]] while (true) {
         bool busy;
-        [[dont_unroll]] do {
+        if (HAS_TREE) [[dont_unroll]] do {
             [[dont_unroll]] for (uint k = 0u; k < NODE_STEPS; ++k) {
                 if (walk.node < walk.end && walk.leaf == 0u) {
                     step_walk(NODE(walk.node), grid, hit.t, NODE_COPIES, walk);
                 }
             }
             if (walk.leaf != 0u) {
-                test_primitive(path, ray, next_primitive(walk), hit);
+                uint index = next_primitive(walk);
+                test_primitive(path, ray, index, PRIMITIVE(index), hit);
                 if (hit.blocked) {
                     walk = Walk(walk.end, walk.end, 0u);
                 }
@@ -85,8 +86,12 @@ void main() {
             ray.origin = path.origin;
             ray.direction = path.direction;
             orthonormal_frame(ray.direction, ray.tangent, ray.bitangent);
-            grid = grid_ray(path.origin, path.direction, params.grid_origin, params.grid_step);
-            walk = start_walk(grid, params.node_count, NODE_COPIES);
+            test_immediates(path, ray, hit);
+            if (HAS_TREE) {
+                grid = grid_ray(path.origin, path.direction, params.grid_origin, params.grid_step);
+                walk = start_walk(grid, params.node_count, NODE_COPIES);
+                walk.node = hit.blocked ? walk.end : walk.node;
+            }
         }
     }
 }

@@ -95,7 +95,7 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("path_rays", &["path_state", "path_surface", "path_flight", "ray"]),
     ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "path_flight", "camera"]),
 ];
-const ALL_MAY_INCLUDE: &[&str] = &["constants", "layout", "features", "sobol"];
+const ALL_MAY_INCLUDE: &[&str] = &["constants", "layout", "features", "immediates", "sobol"];
 
 fn concepts_that_call_concepts(sources: &[Source]) -> Vec<String> {
     let mut found = Vec::new();

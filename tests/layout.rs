@@ -125,7 +125,12 @@ fn features() -> Vec<Features> {
 
 /// The kernels that read their tables through descriptors: what naga can read.
 fn kernels() -> Vec<ShaderSourceText> {
-    let variant = |features| Variant { features, workgroup: device().subgroup_size, buffer_reference: false };
+    let variant = |features| Variant {
+        features,
+        immediates: Vec::new(),
+        workgroup: device().subgroup_size,
+        buffer_reference: false,
+    };
     let mut kernels: Vec<ShaderSourceText> = features()
         .into_iter()
         .map(|features| expand("path_trace.comp", &variant(features)).expect("it expands"))
@@ -226,7 +231,12 @@ fn both_forms_of_a_kernel_render_the_same_image() {
         }
         for packed in &forms {
             let features = packed.features;
-            let variant = |buffer_reference| Variant { features, workgroup: device.subgroup_size, buffer_reference };
+            let variant = |buffer_reference| Variant {
+                features,
+                immediates: packed.immediates().to_vec(),
+                workgroup: device.subgroup_size,
+                buffer_reference,
+            };
             let descriptors = images::with_variant(packed, 16, &variant(false));
             assert!(images::average(&images::mean(&descriptors)).min_element() > 0.0, "{name} is black");
             if device.buffer_reference {

@@ -43,6 +43,7 @@ fn more_features_than_needed_do_not_change_the_image() {
         let packed = scenes::pack(&scene, 8);
         let variant = |features| Variant {
             features,
+            immediates: packed.immediates().to_vec(),
             workgroup: device().subgroup_size,
             buffer_reference: device().buffer_reference,
         };
@@ -52,6 +53,22 @@ fn more_features_than_needed_do_not_change_the_image() {
         let same = needed.iter().zip(&everything).filter(|(a, b)| a == b).count() as f64 / needed.len() as f64;
         eprintln!("{name}: {:.2} % agree, {:.2} % bit-identical", share * 100.0, same * 100.0);
     }
+}
+
+#[test]
+fn primitives_in_the_kernel_and_in_the_tree_are_met_alike() {
+    let mut scene_without_tree = 0;
+    for (name, scene) in scenes::all().into_iter().step_by(3) {
+        let packed = scenes::pack(&scene, 8);
+        scene_without_tree += usize::from(!packed.features.tree);
+        let images = [0, 3].map(|most| images::on_device(&packed.clone().with_immediates(most), 16));
+        let kernel = images::on_device(&packed, 16);
+        for tree in images {
+            let share = images::compare(&kernel, &tree).unwrap_or_else(|why| panic!("{name}: {why}"));
+            assert!(share > 0.999, "{name}: {share}");
+        }
+    }
+    assert!(scene_without_tree > 0, "some scene is small enough");
 }
 
 #[test]

@@ -115,7 +115,7 @@ impl Walks {
     fn new(mesh: Mesh, seed: u64) -> Walks {
         let mut scene: Scene = scenes::gray_box();
         scene.shapes = vec![Shape::diffuse("mesh", Geometry::Mesh(mesh), DVec3::ONE)];
-        let packed = scenes::pack(&scene, 1);
+        let packed = scenes::pack(&scene, 1).with_immediates(0);
         let mut random = Random(seed);
         let (mut rays, mut inside) = (Vec::new(), Vec::new());
         let mut add = |origin: DVec3, direction: DVec3, from_inside| {

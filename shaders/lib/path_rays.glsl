@@ -73,8 +73,7 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
 }
 
 // Tests one primitive.
-void test_primitive(Path path, Ray ray, uint index, inout Hit hit) {
-    Primitive primitive = PRIMITIVE(index);
+void test_primitive(Path path, Ray ray, uint index, Primitive primitive, inout Hit hit) {
     if (HAS_SPHERES && (primitive.surface & PRIMITIVE_SPHERE) != 0u) {
         vec2 t = intersect_sphere(ray, primitive.a, primitive.b.x);
         // A ray that touches the sphere in one point does not cross it: two crossings at one distance would count as one.
@@ -90,3 +89,15 @@ void test_primitive(Path path, Ray ray, uint index, inout Hit hit) {
         }
     }
 }
+
+// Tests a triangle that stands in the kernel as constants: from the edge functions opposite to its corners, and from how far its corners
+// lie along the ray, which are intersect_triangle()'s own. `doubt` is set where an edge passes exactly through the ray.
+void test_projected(Path path, uint index, Primitive primitive, vec3 edges, vec3 along, inout Hit hit, inout bool doubt) {
+    float least = min(edges.x, min(edges.y, edges.z)), most = max_component(edges);
+    doubt = doubt || least == 0.0 || most == 0.0;
+    if (least > 0.0 || most < 0.0) {
+        float inverse = 1.0 / (edges.x + edges.y + edges.z);
+        record(path, index, primitive, dot(edges, along) * inverse, least > 0.0, edges.yz * inverse, hit);
+    }
+}
+#include "lib/immediates.glsl"

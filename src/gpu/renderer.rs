@@ -41,6 +41,7 @@ impl Renderer {
     pub fn new(device: &Arc<Device>, packed: &Packed) -> Result<Renderer, Error> {
         let variant = Variant {
             features: packed.features,
+            immediates: packed.immediates().to_vec(),
             workgroup: device.subgroup_size,
             buffer_reference: device.buffer_reference,
         };

@@ -1,7 +1,7 @@
 //! From GLSL to SPIR-V: includes, generated files, the compiler, and a cache.
 
 use super::Error;
-use crate::pack::{features::Features, layout};
+use crate::pack::{features::Features, immediate, layout};
 use glslang::{
     Compiler, CompilerOptions, Shader, ShaderInput, ShaderSource, ShaderStage, SpirvVersion, Target, VulkanVersion,
 };
@@ -71,10 +71,12 @@ pub struct ShaderSourceText {
 }
 
 /// How a kernel is compiled.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Variant {
     /// The scene's needs.
     pub features: Features,
+    /// Primitives that are part of the kernel: see [`crate::pack::immediate`].
+    pub immediates: Vec<layout::Primitive>,
     /// Invocations of a workgroup.
     pub workgroup: u32,
     /// Tables are read through addresses instead of descriptors.
@@ -100,6 +102,7 @@ pub fn expand_with(
     let generated = |path: &str| match path {
         "lib/layout.glsl" => Some(layout::glsl()),
         "lib/features.glsl" => Some(variant.features.glsl()),
+        "lib/immediates.glsl" => Some(immediate::glsl(&variant.immediates)),
         _ => find(path),
     };
     let mut head = String::from("#version 460\n#extension GL_GOOGLE_cpp_style_line_directive : require\n");

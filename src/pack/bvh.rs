@@ -63,13 +63,14 @@ pub fn bounds(primitive: &Primitive) -> (Vec3, Vec3) {
 impl Bvh {
     /// Builds the tree and returns it with the primitives in the order of its leaves.
     pub fn new(primitives: &[Primitive]) -> (Bvh, Vec<Primitive>) {
-        let (bvh, order) = Bvh::with_order(primitives);
+        let (bvh, order) = Bvh::with_order(primitives, 0);
         (bvh, order.iter().map(|&index| primitives[index as usize]).collect())
     }
 
-    /// Builds the tree and returns it with the indices of the primitives in the order of its leaves.
-    pub fn with_order(primitives: &[Primitive]) -> (Bvh, Vec<u32>) {
-        assert!(primitives.len() <= MAX_PRIMITIVES, "the caller refuses larger scenes");
+    /// Builds the tree and returns it with the indices of the primitives in the order of its leaves. The leaves count from
+    /// `first` on.
+    pub fn with_order(primitives: &[Primitive], first: u32) -> (Bvh, Vec<u32>) {
+        assert!(primitives.len() + first as usize <= MAX_PRIMITIVES, "the caller refuses larger scenes");
         if primitives.is_empty() {
             return (Bvh::empty(), Vec::new());
         }
@@ -89,7 +90,7 @@ impl Bvh {
         let grid = Grid::new(&tree);
         let mut order = Vec::with_capacity(primitives.len());
         let mut leaf_starts = vec![0u32; tree.nodes.len()];
-        number_leaves(&tree, &mut order, &mut leaf_starts);
+        number_leaves(&tree, first, &mut order, &mut leaf_starts);
 
         let node_count = count_nodes(&tree);
         let copies = if node_count * 16 * 8 <= MAX_COPIES_SIZE { 8 } else { 1 };
@@ -157,11 +158,11 @@ fn depth_first(tree: &Bvh2, mut visit: impl FnMut(usize)) {
     }
 }
 
-fn number_leaves(tree: &Bvh2, order: &mut Vec<u32>, starts: &mut [u32]) {
+fn number_leaves(tree: &Bvh2, first_of_all: u32, order: &mut Vec<u32>, starts: &mut [u32]) {
     depth_first(tree, |index| {
         let node = &tree.nodes[index];
         if node.is_leaf() {
-            starts[index] = order.len() as u32;
+            starts[index] = first_of_all + order.len() as u32;
             let first = node.first_index as usize;
             order.extend(&tree.primitive_indices[first..first + node.prim_count as usize]);
         }

@@ -76,6 +76,8 @@ pub struct Features {
     pub rr_depth: u32,
     /// Copies of the tree: 8 or 1.
     pub node_copies: u32,
+    /// Primitives in the tree; without, all stand in the kernel.
+    pub tree: bool,
 }
 
 impl Features {
@@ -130,6 +132,7 @@ impl Features {
             max_depth,
             rr_depth,
             node_copies: packed.bvh.copies,
+            tree: packed.immediate_count < packed.primitives.len(),
         }
     }
 
@@ -164,6 +167,7 @@ impl Features {
             shading_normals: true,
             masks: true,
             far_clip: true,
+            tree: true,
             ..self
         }
     }
@@ -204,6 +208,7 @@ impl Features {
             ("HAS_HIDDEN_EMITTERS", self.hide_emitters),
             ("HAS_LIGHT_SAMPLING", self.light_sampling),
             ("HAS_MIS", self.mis),
+            ("HAS_TREE", self.tree),
         ]
         .map(|(name, value)| format!("const bool {name} = {value};\n"))
         .concat();

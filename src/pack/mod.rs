@@ -8,6 +8,7 @@ pub mod emission;
 pub mod features;
 mod flight;
 pub mod frame;
+pub mod immediate;
 pub mod layout;
 pub mod lights;
 pub mod material;
@@ -33,8 +34,10 @@ pub struct Packed {
     pub frame: Frame,
     /// The hierarchy over `primitives`.
     pub bvh: Bvh,
-    /// Triangles and spheres, in the order of the hierarchy's leaves.
+    /// Triangles and spheres: first those that are part of the kernel, then those of the hierarchy, in the order of its leaves.
     pub primitives: Vec<Primitive>,
+    /// How many primitives are part of the kernel.
+    pub immediate_count: usize,
     /// One for each shape.
     pub surfaces: Vec<Surface>,
     /// Media; entry 0 is vacuum, entry `k` is `MediumId(k − 1)`.
@@ -168,12 +171,10 @@ impl Packed {
             }
         }
         let first_sky = pack_lights(scene, &frame, &mut lights, &mut textures, &mut values)?;
-        let (bvh, order) = Bvh::with_order(&primitives);
         if !corners.is_empty() {
             corners.resize(primitives.len(), Corners::default());
-            corners = order.iter().map(|&index| corners[index as usize]).collect();
         }
-        let primitives: Vec<Primitive> = order.iter().map(|&index| primitives[index as usize]).collect();
+        let Arranged { bvh, primitives, corners, immediate_count } = arrange(primitives, corners, immediate::MOST);
         let lights = lights.finish();
         flight::choose_equiangular(scene, &nesting, &frame, &lights, &mut media);
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
@@ -195,6 +196,7 @@ impl Packed {
             frame,
             bvh,
             primitives,
+            immediate_count,
             surfaces,
             media,
             lights,
@@ -210,10 +212,49 @@ impl Packed {
         Ok(packed)
     }
 
+    /// The same scene with at most `most` primitives in the kernel and all others in the hierarchy: for comparisons.
+    pub fn with_immediates(self, most: usize) -> Packed {
+        let Arranged { bvh, primitives, corners, immediate_count } = arrange(self.primitives, self.corners, most);
+        let params = Params {
+            grid_origin: bvh.grid_origin,
+            node_count: bvh.node_count,
+            grid_step: bvh.grid_step,
+            ..self.params
+        };
+        let tree = immediate_count < primitives.len();
+        let features = Features { node_copies: bvh.copies, tree, ..self.features };
+        Packed { bvh, primitives, corners, immediate_count, params, features, ..self }
+    }
+
+    /// The primitives that are part of the kernel.
+    pub fn immediates(&self) -> &[Primitive] {
+        &self.primitives[..self.immediate_count]
+    }
+
     /// Pixels of the crop window.
     pub fn pixel_count(&self) -> usize {
         self.params.crop_width as usize * self.params.crop_height as usize
     }
+}
+
+/// Primitives in their order, and what goes with them.
+struct Arranged {
+    bvh: Bvh,
+    primitives: Vec<Primitive>,
+    corners: Vec<Corners>,
+    immediate_count: usize,
+}
+
+/// Puts at most `most` primitives first, for the kernel, and the others behind them in the order of a hierarchy's leaves.
+fn arrange(primitives: Vec<Primitive>, corners: Vec<Corners>, most: usize) -> Arranged {
+    let (mut order, immediate_count) = immediate::order(&primitives, most);
+    let behind = order.split_off(immediate_count);
+    let in_tree: Vec<Primitive> = behind.iter().map(|&index| primitives[index as usize]).collect();
+    let (bvh, order_in_tree) = Bvh::with_order(&in_tree, immediate_count as u32);
+    order.extend(order_in_tree.iter().map(|&index| behind[index as usize]));
+    let corners = if corners.is_empty() { corners } else { order.iter().map(|&k| corners[k as usize]).collect() };
+    let primitives = order.iter().map(|&index| primitives[index as usize]).collect();
+    Arranged { bvh, primitives, corners, immediate_count }
 }
 
 /// Stands in until the tables that decide are complete.
@@ -252,6 +293,7 @@ const EMPTY_FEATURES: Features = Features {
     max_depth: 0,
     rr_depth: 0,
     node_copies: 8,
+    tree: true,
 };
 
 /// Index in the packed table: 0 is vacuum.

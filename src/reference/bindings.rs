@@ -11,6 +11,8 @@ pub struct Tables {
     pub nodes: Vec<[u32; 4]>,
     /// In the order of the hierarchy's leaves.
     pub primitives: Vec<Primitive>,
+    /// How many of them stand before those of the tree.
+    pub immediate_count: u32,
     /// One for each shape.
     pub surfaces: Vec<Surface>,
     /// Entry 0 is vacuum.
@@ -146,6 +148,7 @@ impl Tables {
         Tables {
             nodes: packed.bvh.nodes.clone(),
             primitives: packed.primitives.iter().map(Primitive::from).collect(),
+            immediate_count: packed.immediate_count as u32,
             surfaces: packed.surfaces.iter().map(Surface::from).collect(),
             media: packed.media.iter().map(Medium::from).collect(),
             lights: packed.lights.iter().map(Light::from).collect(),

@@ -158,6 +158,9 @@ pub fn traverse(tables: &Tables, path: &Path) -> path::Hit {
     let ray = Ray::new(path.origin, path.direction);
     let grid = grid_ray(path.origin, path.direction, params.grid_origin, params.grid_step);
     let mut walk = start_walk(&grid, params.node_count, copies);
+    for index in 0..tables.immediate_count {
+        test_primitive(tables, path, &ray, index, &mut hit);
+    }
     while !walk.is_done() && !hit.blocked {
         if walk.leaf != 0 {
             test_primitive(tables, path, &ray, next_primitive(&mut walk), &mut hit);

@@ -10,7 +10,7 @@ use tyndall::gpu::shader::{Variant, compile_cached, expand};
 /// How unit kernels are compiled.
 pub fn variant() -> Variant {
     let features = scenes::pack(&scenes::gray_box(), 1).features.everything();
-    Variant { features, workgroup: device().subgroup_size, buffer_reference: false }
+    Variant { features, immediates: Vec::new(), workgroup: device().subgroup_size, buffer_reference: false }
 }
 
 /// Runs `invocations` of `shaders/units/{name}.comp` on the inputs and other tables, and returns its outputs.
