@@ -19,7 +19,7 @@ use tyndall::image::write_whole;
 use tyndall::pack::Packed;
 use tyndall::pack::features::Features;
 use tyndall::reference::bindings::Tables;
-use tyndall::reference::path::{path_advance, path_light, path_start};
+use tyndall::reference::path::{path_answer, path_start};
 use tyndall::reference::traverse;
 use tyndall::render::{BLOCK_SAMPLES, Backend};
 use tyndall::scene::{Film, mitsuba};
@@ -212,11 +212,7 @@ fn count_rays(packed: &Packed, film: &Film) -> f64 {
             while path.alive || path.shadow {
                 rays += 1;
                 let hit = traverse(&tables, &path);
-                if path.shadow {
-                    path_light(&tables, &mut path, &hit);
-                } else {
-                    path_advance(&tables, &mut path, &hit);
-                }
+                path_answer(&tables, &mut path, &hit);
             }
             samples += 1;
         }

@@ -57,11 +57,7 @@ void main() {
         } while (subgroupAdd(busy ? 1u : 0u) > gl_SubgroupSize / 2u);
         if (walk.node >= walk.end && walk.leaf == 0u) {
             if (!fresh) {
-                if (HAS_LIGHT_SAMPLING && path.shadow) {
-                    path_light(path, hit);
-                } else {
-                    path_advance(path, hit);
-                }
+                path_answer(path, hit);
             }
             if (!path.alive && !path.shadow) {
                 if (!fresh) {

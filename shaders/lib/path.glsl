@@ -4,13 +4,14 @@
 // A path's life:
 //   1. path_start       a ray from the camera, a free flight for its first segment
 //   2. (traversal)      the nearest primitive within the free flight, or none
-//   3. path_advance     a boundary without a surface: change the medium, go on along the same ray  -> 2
+//   3. meet             a boundary without a surface: change the medium, go on along the same ray  -> 2
 //                       nothing within the flight: scatter in the medium                           -> 4
 //                       a surface: add what it emits, reflect                                      -> 4
 //                       nothing at all: add what comes from infinitely far, end
-//   4. (same call)      choose a light, ask for a shadow ray; sample the next direction; roulette
+//   4. scatter          choose a light, ask for a shadow ray; sample the next direction
 //   5. (traversal)      everything along the shadow ray, in any order
-//   6. path_light       add the light that got through; next segment -> 2
+//   6. path_light       add the light that got through
+//   7. next_segment     roulette, a free flight -> 2
 #include "lib/path_state.glsl"
 #include "lib/path_vertex.glsl"
 #include "lib/path_lights.glsl"
@@ -95,17 +96,14 @@ void next_segment(inout Path path) {
     begin_segment(path, u.zw);
 }
 
-// Goes straight on through a surface.
-void cross_surface(inout Path path, Primitive primitive, Surface surface, Hit hit) {
+// Goes straight on through a surface, at path.anchor.
+void cross_surface(inout Path path, Surface surface, Hit hit) {
     uint inside = surface.media & 0xffffu, outside = surface.media >> 16u;
     bool again = path.last != NONE && hit.t - path.t_min < near_distance(path, hit.t);
     enter_medium(path, hit.along_normal ? inside : outside, hit.along_normal ? outside : inside, again);
     path.t_min = hit.t;
     path.last = hit.primitive;
     path.last_along_normal = hit.along_normal;
-    vec3 normal;
-    float largest;
-    surface_point(primitive, path, hit, path.anchor, normal, largest);
     path.tau_left = max(path.tau_left, 0.0);
     path.t_max = flight_end(path);
 }
@@ -119,8 +117,9 @@ bool passes_mask(inout Path path, Surface surface, Primitive primitive, Hit hit)
     return u >= opacity;
 }
 
-// Answers a ray that extends the path.
-void path_advance(inout Path path, Hit hit) {
+// What a ray that extends the path meets. Returns whether it is a vertex that scatters; else the path ends, or goes on along the
+// same ray. (Kernels compute both sides of a branch for some paths or others, so nothing stands here twice.)
+bool meet(inout Path path, Hit hit, out Vertex vertex) {
     bool surface_hit = hit.primitive != NONE && hit.t < path.t_max;
     float t = surface_hit ? hit.t : path.t_max;
 
@@ -133,87 +132,88 @@ void path_advance(inout Path path, Hit hit) {
             add_medium_emission(path, medium, end.scatters ? free_way(path, medium) : t - path.t_min, end.scatters);
         }
     }
+    FlightSide side = FlightSide(hit.primitive, 0.0);
+    if (HAS_MEDIA && end.scatters) {
+        side = flight_side(path, hit, end.way);
+    }
+    Primitive primitive;
+    if (side.primitive != NONE) {
+        primitive = PRIMITIVE(side.primitive);
+    }
+    vertex.in_medium = end.scatters;
+    vertex.axis = path.direction;
+    vertex.normal = path.direction;
+    path.shadow = false;
     if (end.scatters) {
         path.offset = 0.0;
         path.normal = path.direction;
         path.left = NONE;
-        Surface none;
-        vec3 point = flight_point(path, hit, end.way);
-        scatter(path, Vertex(point, path.direction, true, medium.g, medium.phase, end.weight, none, vec3(0.0), vec3(0.0), vec3(0.0)));
-    } else {
-        if (HAS_MEDIA) {
-            // The optical depth of the way through the medium since t_min.
-            float way = t - path.t_min;
-            path.tau_left -= way * (HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
-            if (HAS_CHROMATIC) {
-                path.tau_rgb += medium.sigma_t * way;
-            } else {
-                path.tau += medium.sigma_t.x * way;
-            }
+        vertex.point = flight_point(path, primitive, side, end.way);
+        vertex.g = medium.g;
+        vertex.phase = medium.phase;
+        vertex.albedo = end.weight;
+        return true;
+    }
+    if (HAS_MEDIA) {
+        // The optical depth of the way through the medium since t_min.
+        float way = t - path.t_min;
+        path.tau_left -= way * (HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
+        if (HAS_CHROMATIC) {
+            path.tau_rgb += medium.sigma_t * way;
+        } else {
+            path.tau += medium.sigma_t.x * way;
         }
-        if (!surface_hit) {
-            add_sky(path);
-            path.alive = false;
-            path.shadow = false;
-            return;
-        }
-        Primitive primitive = PRIMITIVE(hit.primitive);
-        Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
-        if (HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u) {
-            cross_surface(path, primitive, surface, hit);
-            return;
-        }
-        vec3 point, normal;
-        float largest;
-        surface_point(primitive, path, hit, point, normal, largest);
+    }
+    if (!surface_hit) {
+        add_sky(path);
+        path.alive = false;
+        return false;
+    }
+    Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
+    bool crosses = HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u;
+    vec3 point, normal;
+    float largest;
+    surface_point(primitive, path, hit, point, normal, largest);
+    if (!crosses) {
         add_emission(path, primitive, t, normal);
-        if (HAS_MASK && (surface.flags & SURFACE_MASK) != 0u && passes_mask(path, surface, primitive, hit)) {
-            cross_surface(path, primitive, surface, hit);
-            return;
-        }
-        path.throughput = survived_throughput(path);
-        bool back = dot(path.direction, normal) > 0.0;
-        if (HAS_ONE_SIDED && back && (surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED)) == 0u) {
-            path.alive = false;
-            path.shadow = false;
-            return;
-        }
-        bool turned = back && !(HAS_DIELECTRIC && (surface.flags & SURFACE_ORIENTED) != 0u);
-        vec3 axis = normal;
-        if (HAS_SHADING_NORMALS && (surface.flags & SURFACE_SMOOTH) != 0u) {
-            axis = shading_normal(hit.primitive, hit.barycentric, normal);
-        }
-        axis = turned ? -axis : axis;
-        normal = turned ? -normal : normal;
-        vec3 tangent, bitangent;
-        if (HAS_ANISOTROPIC) {
-            orthonormal_frame(axis, tangent, bitangent);
-            if (surface.alpha != surface.alpha_v) {
-                tangent = surface_tangent(primitive, hit.primitive, point, axis);
-            }
-        }
-        if (HAS_TEXTURES && (surface.textures_1 | (surface.textures_2 & 0xffffu)) != 0u) {
-            apply_textures(surface, texture_coordinates(primitive, hit.primitive, point, hit.barycentric));
-        }
-        path.offset = offset_distance(largest);
-        path.normal = normal;
-        path.left = is_sphere(primitive) ? NONE : hit.primitive;
-        vec3 incident = to_surface_frame(tangent, axis, -path.direction);
-        Vertex vertex = Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, incident, tangent, normal);
-        if (!sides_agree(vertex, incident.z, -path.direction)) {
-            // The surface is seen from one side, its shading normal from the other one: nothing is reflected.
-            path.alive = false;
-            path.shadow = false;
-            return;
-        }
-        scatter(path, vertex);
+        crosses = HAS_MASK && (surface.flags & SURFACE_MASK) != 0u && passes_mask(path, surface, primitive, hit);
     }
-    if (!path.shadow && path.alive) {
-        next_segment(path);
+    if ((HAS_BOUNDARIES || HAS_MASK) && crosses) {
+        path.anchor = point;
+        cross_surface(path, surface, hit);
+        return false;
     }
+    path.throughput = survived_throughput(path);
+    bool back = dot(path.direction, normal) > 0.0;
+    // Where a surface is seen from one side, but its shading normal from the other one, nothing is reflected.
+    bool seen = !(HAS_ONE_SIDED && back && (surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED)) == 0u);
+    bool turned = back && !(HAS_DIELECTRIC && (surface.flags & SURFACE_ORIENTED) != 0u);
+    vec3 axis = normal;
+    if (HAS_SHADING_NORMALS && (surface.flags & SURFACE_SMOOTH) != 0u) {
+        axis = shading_normal(hit.primitive, hit.barycentric, normal);
+    }
+    axis = turned ? -axis : axis;
+    normal = turned ? -normal : normal;
+    vec3 tangent, bitangent;
+    if (HAS_ANISOTROPIC) {
+        orthonormal_frame(axis, tangent, bitangent);
+        if (surface.alpha != surface.alpha_v) {
+            tangent = surface_tangent(primitive, hit.primitive, point, axis);
+        }
+    }
+    if (HAS_TEXTURES && (surface.textures_1 | (surface.textures_2 & 0xffffu)) != 0u) {
+        apply_textures(surface, texture_coordinates(primitive, hit.primitive, point, hit.barycentric));
+    }
+    path.offset = offset_distance(largest);
+    path.normal = normal;
+    path.left = is_sphere(primitive) ? NONE : hit.primitive;
+    vec3 incident = to_surface_frame(tangent, axis, -path.direction);
+    vertex = Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, incident, tangent, normal);
+    path.alive = seen && sides_agree(vertex, incident.z, -path.direction);
+    return path.alive;
 }
 
-// Answers a shadow ray.
+// Adds what a shadow ray brings.
 void path_light(inout Path path, Hit hit) {
     if (!hit.blocked) {
         vec3 transmittance = vec3(1.0);
@@ -239,7 +239,21 @@ void path_light(inout Path path, Hit hit) {
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
     }
     path.shadow = false;
-    if (path.alive) {
+}
+
+// Answers the ray that the path asked for.
+void path_answer(inout Path path, Hit hit) {
+    bool leaves = true; // a vertex
+    if (HAS_LIGHT_SAMPLING && path.shadow) {
+        path_light(path, hit);
+    } else {
+        Vertex vertex;
+        leaves = meet(path, hit, vertex);
+        if (leaves) {
+            scatter(path, vertex);
+        }
+    }
+    if (leaves && path.alive && !path.shadow) {
         next_segment(path);
     }
 }

@@ -100,18 +100,27 @@ vec3 keep_on_side(Primitive primitive, vec3 point, float side) {
     return missing > 0.0 && missing < 64.0 * vertex_clearance(largest) ? point + normal * (side * missing) : point;
 }
 
-// The end of a flight on the right side of the surface behind it (`hit`) or before it (`path.last`). It is found from the boundary
-// through which the ray came, so that what the ray's distances lose to rounding on a long way does not matter.
-vec3 flight_point(Path path, Hit hit, float way) {
+// The surface that the end of a flight is so close to that it may round to the other side: the one behind it (`hit`), or else the one
+// before it (`path.last`), or NONE. `side` is that of the flight, as in keep_on_side().
+struct FlightSide {
+    uint primitive;
+    float side;
+};
+
+FlightSide flight_side(Path path, Hit hit, float way) {
     float t = path.t_min + way;
-    vec3 point = path.last != NONE ? path.anchor + path.direction * way : path.origin + path.direction * t;
     float close = near_distance(path, t);
     if (hit.primitive != NONE && hit.t - t < close) {
-        point = keep_on_side(PRIMITIVE(hit.primitive), point, hit.along_normal ? -1.0 : 1.0);
-    } else if (path.last != NONE && way < close) {
-        point = keep_on_side(PRIMITIVE(path.last), point, path.last_along_normal ? 1.0 : -1.0);
+        return FlightSide(hit.primitive, hit.along_normal ? -1.0 : 1.0);
     }
-    return point;
+    return FlightSide(way < close ? path.last : NONE, path.last_along_normal ? 1.0 : -1.0);
+}
+
+// The end of a flight, on its side of the primitive. It is found from the boundary through which the ray came, so that what the ray's
+// distances lose to rounding on a long way does not matter.
+vec3 flight_point(Path path, Primitive primitive, FlightSide side, float way) {
+    vec3 point = path.last != NONE ? path.anchor + path.direction * way : path.origin + path.direction * (path.t_min + way);
+    return side.primitive != NONE ? keep_on_side(primitive, point, side.side) : point;
 }
 
 // Goes through a boundary. Crossings at one place, `again` but for the first, may come in any order (rounding

@@ -64,7 +64,7 @@ void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
     } else if (HAS_RECTANGLE_LIGHTS && light.kind == LIGHT_RECTANGLE) {
         // Of the vertex itself, as light sampling has it: near the light the offset of the ray's origin counts.
         pdf = rectangle_light_pdf(light, path.point, t, cos_light);
-    } else {
+    } else if (HAS_PLANE_LIGHTS) {
         pdf = area_pdf(light.area, t, cos_light);
     }
     float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * pdf : 0.0;
@@ -122,7 +122,7 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u, vec2 decision) {
         found = sample_sphere_light(light, vertex.point, u);
     } else if (HAS_RECTANGLE_LIGHTS && light.kind == LIGHT_RECTANGLE) {
         found = sample_rectangle_light(light, vertex.point, u);
-    } else {
+    } else if (HAS_PLANE_LIGHTS) {
         found = sample_plane_light(light, vertex.point, u);
     }
     BsdfValue scattering = eval_scattering(vertex, found.direction);

@@ -27,6 +27,8 @@ pub struct Features {
     pub spheres: bool,
     /// A triangle, parallelogram or sphere that emits.
     pub area_lights: bool,
+    /// A triangle or parallelogram that emits.
+    pub plane_lights: bool,
     /// A rectangle that emits.
     pub rectangle_lights: bool,
     /// A sphere that emits.
@@ -103,6 +105,7 @@ impl Features {
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
             spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
             area_lights,
+            plane_lights: kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD),
             rectangle_lights: kind(LIGHT_RECTANGLE),
             sphere_lights: kind(LIGHT_SPHERE),
             point_lights: kind(LIGHT_POINT),
@@ -149,6 +152,7 @@ impl Features {
             boundaries: true,
             spheres: true,
             area_lights: true,
+            plane_lights: true,
             rectangle_lights: true,
             sphere_lights: true,
             point_lights: true,
@@ -185,6 +189,7 @@ impl Features {
             ("HAS_BOUNDARIES", self.boundaries),
             ("HAS_SPHERES", self.spheres),
             ("HAS_AREA_LIGHTS", self.area_lights),
+            ("HAS_PLANE_LIGHTS", self.plane_lights),
             ("HAS_RECTANGLE_LIGHTS", self.rectangle_lights),
             ("HAS_SPHERE_LIGHTS", self.sphere_lights),
             ("HAS_POINT_LIGHTS", self.point_lights),

@@ -269,6 +269,7 @@ const EMPTY_FEATURES: Features = Features {
     boundaries: false,
     spheres: false,
     area_lights: false,
+    plane_lights: false,
     rectangle_lights: false,
     sphere_lights: false,
     point_lights: false,

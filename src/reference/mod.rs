@@ -35,7 +35,7 @@ use bindings::Tables;
 use bvh::{grid_ray, next_primitive, start_walk, step_walk};
 use film::tile_pixel;
 use glam::DVec3;
-use path::{Path, begin_hit, path_advance, path_light, path_start, test_primitive};
+use path::{Path, begin_hit, path_answer, path_start, test_primitive};
 use ray::Ray;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -142,11 +142,7 @@ pub fn trace(tables: &Tables, pixel: u32, sample_index: u32) -> DVec3 {
     let mut path = path_start(tables, pixel, sample_index);
     while path.alive || path.shadow {
         let hit = traverse(tables, &path);
-        if path.shadow {
-            path_light(tables, &mut path, &hit);
-        } else {
-            path_advance(tables, &mut path, &hit);
-        }
+        path_answer(tables, &mut path, &hit);
     }
     path.radiance
 }

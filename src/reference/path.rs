@@ -6,7 +6,7 @@ use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::channel_weights;
-use super::path_flight::{end_flight, enter_medium, flight_point, free_way, near_distance};
+use super::path_flight::{end_flight, enter_medium, flight_point, flight_side, free_way, near_distance};
 use super::path_lights::{add_emission, add_medium_emission, add_sky, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
@@ -98,7 +98,7 @@ fn next_segment(tables: &Tables, path: &mut Path) {
     begin_segment(tables, path, u.zw());
 }
 
-/// Goes straight on through a surface.
+/// Goes straight on through a surface, at `path.anchor`.
 fn cross_surface(tables: &Tables, path: &mut Path, surface: &Surface, hit: &Hit) {
     let (inside, outside) = (surface.media & 0xffff, surface.media >> 16);
     let (from, to) = if hit.along_normal { (inside, outside) } else { (outside, inside) };
@@ -107,7 +107,6 @@ fn cross_surface(tables: &Tables, path: &mut Path, surface: &Surface, hit: &Hit)
     path.t_min = hit.t;
     path.last = hit.primitive;
     path.last_along_normal = hit.along_normal;
-    path.anchor = surface_point(tables.primitive(hit.primitive), path, hit).0;
     path.tau_left = path.tau_left.max(0.0);
     path.t_max = flight_end(tables, path);
 }
@@ -121,8 +120,8 @@ fn passes_mask(tables: &Tables, path: &mut Path, surface: &Surface, place: &Plac
     u >= opacity
 }
 
-/// Answers a ray that extends the path.
-pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
+/// What a ray that extends the path meets: a vertex that scatters, or else the path ends, or goes on along the same ray.
+fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     let surface_hit = hit.primitive != NONE && hit.t < path.t_max;
     let t = if surface_hit { hit.t } else { path.t_max };
 
@@ -131,80 +130,67 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
     let flown = if end.scatters { free_way(path, &medium) } else { t - path.t_min };
     add_medium_emission(tables, path, &medium, flown, end.scatters);
     if end.scatters {
-        let point = flight_point(tables, path, hit, end.way);
+        let point = flight_point(tables, path, flight_side(path, hit, end.way), end.way);
         path.offset = 0.0;
         path.normal = path.direction;
         path.left = NONE;
         let (axis, surface, incident) = (path.direction, Surface::default(), DVec3::ZERO);
         let Medium { g, phase, .. } = medium;
-        let (tangent, normal) = (DVec3::ZERO, DVec3::ZERO);
+        let (tangent, normal) = (DVec3::ZERO, path.direction);
         let albedo = end.weight;
-        let vertex = Vertex { point, axis, in_medium: true, g, phase, albedo, surface, incident, tangent, normal };
-        scatter(tables, path, &vertex);
-    } else {
-        // The optical depth of the way through the medium since `t_min`.
-        let way = t - path.t_min;
-        path.tau_left -= way * medium.sigma_t[path.channel as usize];
-        path.tau_rgb += medium.sigma_t * way;
-        if !surface_hit {
-            add_sky(tables, path);
-            path.alive = false;
-            path.shadow = false;
-            return;
-        }
-        let primitive = tables.primitive(hit.primitive);
-        let surface = tables.surface_of(primitive);
-        if primitive.surface & PRIMITIVE_BOUNDARY != 0 {
-            cross_surface(tables, path, surface, hit);
-            return;
-        }
-        let (point, normal, largest) = surface_point(primitive, path, hit);
+        return Some(Vertex { point, axis, in_medium: true, g, phase, albedo, surface, incident, tangent, normal });
+    }
+    // The optical depth of the way through the medium since `t_min`.
+    let way = t - path.t_min;
+    path.tau_left -= way * medium.sigma_t[path.channel as usize];
+    path.tau_rgb += medium.sigma_t * way;
+    if !surface_hit {
+        add_sky(tables, path);
+        path.alive = false;
+        return None;
+    }
+    let primitive = tables.primitive(hit.primitive);
+    let surface = tables.surface_of(primitive);
+    let (point, normal, largest) = surface_point(primitive, path, hit);
+    let Hit { barycentric, .. } = *hit;
+    let mut place = Place { index: hit.primitive, point: path.origin + path.direction * t, barycentric };
+    let mut crosses = primitive.surface & PRIMITIVE_BOUNDARY != 0;
+    if !crosses {
         add_emission(tables, path, primitive, t, normal);
-        let Hit { barycentric, .. } = *hit;
-        let mut place = Place { index: hit.primitive, point: path.origin + path.direction * t, barycentric };
-        if surface.flags & SURFACE_MASK != 0 && passes_mask(tables, path, surface, &place) {
-            cross_surface(tables, path, surface, hit);
-            return;
-        }
-        path.throughput = survived_throughput(path);
-        let back = path.direction.dot(normal) > 0.0;
-        if back && surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED) == 0 {
-            path.alive = false;
-            path.shadow = false;
-            return;
-        }
-        place.point = point;
-        let turned = back && surface.flags & SURFACE_ORIENTED == 0;
-        let smooth = surface.flags & SURFACE_SMOOTH != 0;
-        let axis = if smooth { shading_normal(tables, &place, normal) } else { normal };
-        let (axis, normal) = if turned { (-axis, -normal) } else { (axis, normal) };
-        let isotropic = surface.alpha == surface.alpha_v;
-        let tangent = if isotropic { orthonormal_frame(axis).0 } else { surface_tangent(tables, &place, axis) };
-        let mut surface = *surface;
-        if surface.textures_1 | surface.textures_2 & 0xffff != 0 {
-            apply_textures(tables, &mut surface, texture_coordinates(tables, &place));
-        }
-        path.offset = offset_distance(largest);
-        path.normal = normal;
-        path.left = if primitive.surface & PRIMITIVE_SPHERE == 0 { hit.primitive } else { NONE };
-        let incident = to_surface_frame(tangent, axis, -path.direction);
-        let (in_medium, g, phase, albedo) = (false, 0.0, 0, DVec3::ZERO);
-        let vertex = Vertex { point, axis, in_medium, g, phase, albedo, surface, incident, tangent, normal };
-        if !sides_agree(&vertex, incident.z, -path.direction) {
-            // The surface is seen from one side, its shading normal from the other one: nothing is reflected.
-            path.alive = false;
-            path.shadow = false;
-            return;
-        }
-        scatter(tables, path, &vertex);
+        crosses = surface.flags & SURFACE_MASK != 0 && passes_mask(tables, path, surface, &place);
     }
-    if !path.shadow && path.alive {
-        next_segment(tables, path);
+    if crosses {
+        path.anchor = point;
+        cross_surface(tables, path, surface, hit);
+        return None;
     }
+    path.throughput = survived_throughput(path);
+    let back = path.direction.dot(normal) > 0.0;
+    // Where a surface is seen from one side, but its shading normal from the other one, nothing is reflected.
+    let seen = !back || surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED) != 0;
+    place.point = point;
+    let turned = back && surface.flags & SURFACE_ORIENTED == 0;
+    let smooth = surface.flags & SURFACE_SMOOTH != 0;
+    let axis = if smooth { shading_normal(tables, &place, normal) } else { normal };
+    let (axis, normal) = if turned { (-axis, -normal) } else { (axis, normal) };
+    let isotropic = surface.alpha == surface.alpha_v;
+    let tangent = if isotropic { orthonormal_frame(axis).0 } else { surface_tangent(tables, &place, axis) };
+    let mut surface = *surface;
+    if surface.textures_1 | surface.textures_2 & 0xffff != 0 {
+        apply_textures(tables, &mut surface, texture_coordinates(tables, &place));
+    }
+    path.offset = offset_distance(largest);
+    path.normal = normal;
+    path.left = if primitive.surface & PRIMITIVE_SPHERE == 0 { hit.primitive } else { NONE };
+    let incident = to_surface_frame(tangent, axis, -path.direction);
+    let (in_medium, g, phase, albedo) = (false, 0.0, 0, DVec3::ZERO);
+    let vertex = Vertex { point, axis, in_medium, g, phase, albedo, surface, incident, tangent, normal };
+    path.alive = seen && sides_agree(&vertex, incident.z, -path.direction);
+    path.alive.then_some(vertex)
 }
 
-/// Answers a shadow ray.
-pub fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
+/// Adds what a shadow ray brings.
+fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
     if !hit.blocked {
         let mut transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO)) * hit.passed;
         let mut survives = channel_weights(path.light_channels).dot(transmittance);
@@ -217,7 +203,17 @@ pub fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
     }
     path.shadow = false;
-    if path.alive {
+}
+
+/// Answers the ray that the path asked for.
+pub fn path_answer(tables: &Tables, path: &mut Path, hit: &Hit) {
+    if path.shadow {
+        path_light(tables, path, hit);
+    } else {
+        let Some(vertex) = meet(tables, path, hit) else { return };
+        scatter(tables, path, &vertex);
+    }
+    if path.alive && !path.shadow {
         next_segment(tables, path);
     }
 }

@@ -99,19 +99,30 @@ fn keep_on_side(primitive: &Primitive, point: DVec3, side: f64) -> DVec3 {
     if missing > 0.0 && missing < 64.0 * vertex_clearance(largest) { point + normal * (side * missing) } else { point }
 }
 
-/// The end of a flight on the right side of the surface behind it (`hit`) or before it (`path.last`).
-pub fn flight_point(tables: &Tables, path: &Path, hit: &Hit, way: f64) -> DVec3 {
+/// The surface that the end of a flight is so close to that it may round to the other side: the one behind it (`hit`), or else the one
+/// before it (`path.last`), or [`NONE`]. `side` is that of the flight, as in `keep_on_side`.
+#[derive(Clone, Copy, Debug)]
+pub struct FlightSide {
+    primitive: u32,
+    side: f64,
+}
+
+/// Which surface the end of a flight must be kept on its side of.
+pub fn flight_side(path: &Path, hit: &Hit, way: f64) -> FlightSide {
     let t = path.t_min + way;
-    let (start, distance) = if path.last == NONE { (path.origin, t) } else { (path.anchor, way) };
-    let point = start + path.direction * distance;
     let close = near_distance(path, t);
     if hit.primitive != NONE && hit.t - t < close {
-        keep_on_side(tables.primitive(hit.primitive), point, if hit.along_normal { -1.0 } else { 1.0 })
-    } else if path.last != NONE && way < close {
-        keep_on_side(tables.primitive(path.last), point, if path.last_along_normal { 1.0 } else { -1.0 })
-    } else {
-        point
+        return FlightSide { primitive: hit.primitive, side: if hit.along_normal { -1.0 } else { 1.0 } };
     }
+    let primitive = if way < close { path.last } else { NONE };
+    FlightSide { primitive, side: if path.last_along_normal { 1.0 } else { -1.0 } }
+}
+
+/// The end of a flight, on its side of the primitive.
+pub fn flight_point(tables: &Tables, path: &Path, side: FlightSide, way: f64) -> DVec3 {
+    let (start, distance) = if path.last == NONE { (path.origin, path.t_min + way) } else { (path.anchor, way) };
+    let point = start + path.direction * distance;
+    if side.primitive == NONE { point } else { keep_on_side(tables.primitive(side.primitive), point, side.side) }
 }
 
 /// Goes through a boundary. Crossings at one place, `again` but for the first, may come in any order; only their
