@@ -1,6 +1,7 @@
 // Sums the samples of each pixel, block by block and in order, so that the sums do not depend on who rendered a sample or when.
 #version 460
 #include "lib/layout.glsl"
+#include "lib/features.glsl"
 #include "lib/film.glsl"
 
 layout(local_size_x = WORKGROUP) in;
@@ -40,7 +41,7 @@ void main() {
                 atomicAdd(invalid[4u * block], 1u);
             } else if (is_infinite(value.x) || is_infinite(value.y) || is_infinite(value.z)) {
                 atomicAdd(invalid[4u * block + 1u], 1u);
-            } else if (is_negative(value.x) || is_negative(value.y) || is_negative(value.z)) {
+            } else if (!HAS_PILOT && (is_negative(value.x) || is_negative(value.y) || is_negative(value.z))) {
                 atomicAdd(invalid[4u * block + 2u], 1u);
             }
         }

@@ -7,6 +7,7 @@
 pub mod gpu;
 pub mod image;
 pub mod pack;
+pub mod pilot;
 pub mod reference;
 pub mod render;
 pub mod scene;

@@ -18,6 +18,7 @@
 #include "lib/path_rays.glsl"
 #include "lib/path_flight.glsl"
 #include "lib/camera.glsl"
+#include "lib/outlook.glsl"
 
 // Depth at which roulette begins to end paths that lose nothing, so that a closed scene without absorption ends. A path gets
 // to depth d with a probability near (RELENTLESS_DEPTH / d)²: slowly enough for dense media that absorb nothing, in which the number
@@ -44,13 +45,37 @@ void path_start(inout Path path) {
     path.pdf = 0.0;
     path.alive = true;
     path.eta_scale = 1.0;
+    path.foreseen = false;
+    if (HAS_PILOT) {
+        uvec2 block = uvec2(column - params.crop_x, row - params.crop_y) / params.block_side;
+        uint first = params.first_block + 4u * (block.y * params.block_columns + block.x);
+        path.focus = vec3(VALUE(first), VALUE(first + 1u), VALUE(first + 2u));
+    }
     path.left = NONE;
     path.crossings = 0u;
     path.medium = params.camera_medium;
     begin_segment(path, u.zw);
 }
 
-// Scatters at a vertex: the shadow ray, the next direction, roulette.
+// Roulette at a vertex, by what the pilot expects of the rest of the path. Returns whether the path goes on.
+bool goes_on(inout Path path, Vertex vertex) {
+    vec3 place = (vertex.point - params.pilot_origin) * params.pilot_scale;
+    uint first = params.first_cell + 8u * outlook_cell(place, vertex.in_medium, vertex.axis);
+    Outlook outlook;
+    outlook.mean = vec3(VALUE(first), VALUE(first + 1u), VALUE(first + 2u));
+    outlook.worth = vec3(VALUE(first + 3u), VALUE(first + 4u), VALUE(first + 5u));
+    path.foreseen = outlook.worth.x >= 0.0;
+    vec3 throughput = vertex.in_medium ? path.throughput * vertex.albedo : path.throughput;
+    float keep = path.foreseen ? keep_by_outlook(outlook, throughput, path.focus) : 1.0;
+    // The second vertex has points of the table to itself, unless the other roulette begins so early.
+    uint set = path.segment == 1u && RR_DEPTH > 1u ? 2u : 2u * path.segment + 2u;
+    path.alive = sample_set(path, set).x < keep;
+    path.radiance += throughput * outlook.mean * (path.alive ? 1.0 - 1.0 / keep : 1.0);
+    path.throughput /= keep;
+    return path.alive;
+}
+
+// Scatters at a vertex: the shadow ray and the next direction.
 void scatter(inout Path path, Vertex vertex) {
     path.depth += 1u;
     path.shadow = false;
@@ -85,7 +110,8 @@ void next_segment(inout Path path) {
     vec4 u = sample_set(path, 2u * path.segment);
     if (path.depth >= RR_DEPTH) {
         float most = path.depth < RELENTLESS_DEPTH ? 1.0 : 1.0 - 2.0 / float(path.depth);
-        float keep = min(3.0 * max_component(path.throughput) * (HAS_DIELECTRIC ? path.eta_scale : 1.0), most);
+        float worth = 3.0 * max_component(path.throughput) * (HAS_DIELECTRIC ? path.eta_scale : 1.0);
+        float keep = HAS_PILOT && path.foreseen ? most : min(worth, most);
         path.alive = path.alive && u.x < keep;
         path.throughput /= keep;
     }
@@ -249,6 +275,9 @@ void path_answer(inout Path path, Hit hit) {
     } else {
         Vertex vertex;
         leaves = meet(path, hit, vertex);
+        if (HAS_PILOT && leaves && path.depth > 0u) {
+            leaves = goes_on(path, vertex);
+        }
         if (leaves) {
             scatter(path, vertex);
         }

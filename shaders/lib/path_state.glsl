@@ -52,6 +52,9 @@ struct Path {
     vec3 normal;            // only valid when offset > 0
     uint left;              // the triangle on which the vertex lies, which its rays cannot meet again; else NONE
     uint next_medium;       // where dielectrics are: the medium of the next segment
+    // Roulette by a pilot.
+    vec3 focus;             // one over the square of the pixel's radiance
+    bool foreseen;          // the pilot knows the vertex
     float eta_scale;        // where dielectrics are: the product of squared indices that refraction divided radiance by
 };
 

@@ -73,6 +73,9 @@ pub struct RenderArgs {
     /// `auto`, a part of a device's name or its number as listed by `tyndall devices`, or `reference` (the CPU)
     #[arg(long, value_name = "NAME|INDEX|reference", default_value = "auto")]
     pub device: String,
+    /// Russian roulette by the throughput alone, without a pilot run that finds out where paths are worth their time
+    #[arg(long)]
+    pub no_pilot: bool,
     /// Also write an 8-bit sRGB PNG to look at
     #[arg(long, value_name = "OUT.png")]
     pub preview: Option<PathBuf>,

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use tyndall::gpu::{self, Device, DeviceChoice, DeviceDescription};
 use tyndall::pack::Packed;
+use tyndall::pilot;
 use tyndall::reference;
 use tyndall::render::{Backend, BackendError};
 use tyndall::scene::Scene;
@@ -17,9 +18,18 @@ pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Loaded, CliEr
 }
 
 /// Opens the device that `choice` names ("auto" for the best one, a part of its name, its number in [`list`], or "reference"
-/// for the CPU) and prepares it for the crop window of `scene`. Warnings go to `warn`.
-pub fn open(choice: &str, scene: &Scene, seed: u32, warn: &mut dyn FnMut(&str)) -> Result<Box<dyn Backend>, CliError> {
-    let packed = Packed::new(scene, seed).map_err(|error| CliError::Scene(error.to_string()))?;
+/// for the CPU) and prepares it for the crop window of `scene`, after a pilot run if `with_pilot`. Warnings go to `warn`.
+pub fn open(
+    choice: &str,
+    scene: &Scene,
+    seed: u32,
+    with_pilot: bool,
+    warn: &mut dyn FnMut(&str),
+) -> Result<Box<dyn Backend>, CliError> {
+    let mut packed = Packed::new(scene, seed).map_err(|error| CliError::Scene(error.to_string()))?;
+    if with_pilot {
+        pilot::run(&mut packed);
+    }
     packed.warnings.iter().for_each(|warning| warn(warning));
     if choice == "reference" {
         return Ok(Box::new(reference::Renderer::new(packed)));

@@ -76,6 +76,8 @@ pub struct Features {
     pub max_depth: u32,
     /// Depth from which Russian roulette may end a path.
     pub rr_depth: u32,
+    /// Roulette by what a pilot run expects.
+    pub pilot: bool,
     /// Copies of the tree: 8 or 1.
     pub node_copies: u32,
     /// Primitives in the tree; without, all stand in the kernel.
@@ -134,6 +136,7 @@ impl Features {
             mis: true,
             max_depth,
             rr_depth,
+            pilot: false,
             node_copies: packed.bvh.copies,
             tree: packed.immediate_count < packed.primitives.len(),
         }
@@ -214,6 +217,7 @@ impl Features {
             ("HAS_LIGHT_SAMPLING", self.light_sampling),
             ("HAS_MIS", self.mis),
             ("HAS_TREE", self.tree),
+            ("HAS_PILOT", self.pilot),
         ]
         .map(|(name, value)| format!("const bool {name} = {value};\n"))
         .concat();

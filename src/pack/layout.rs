@@ -329,6 +329,22 @@ gpu_struct! {
         world_sigma_t: Vec3,
         /// Index of the first light that shines from all directions; these come last in the table.
         first_sky: u32,
+        /// Lower corner of the cells of the pilot.
+        pilot_origin: Vec3,
+        /// Index of the first number of the pilot's cells: of each its mean, its worth and two that fill up.
+        first_cell: u32,
+        /// Cells of the pilot per unit of length, on each axis.
+        pilot_scale: Vec3,
+        /// Index of the first number of the pilot's blocks of pixels: of each one over the square of its radiance, and one that fills up.
+        first_block: u32,
+        /// Pixels of a side of the pilot's blocks.
+        block_side: u32,
+        /// Blocks in a row.
+        block_columns: u32,
+        /// Fills the sixteen bytes.
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
     }
 }
 
@@ -354,6 +370,8 @@ gpu_struct! {
     }
 }
 
+/// Cells of the pilot on each axis.
+pub const PILOT_CELLS: u32 = 12;
 /// Bit 31 of [`Primitive::surface`].
 pub const PRIMITIVE_BOUNDARY: u32 = 1 << 31;
 /// Bit 30 of [`Primitive::surface`].
@@ -445,6 +463,7 @@ pub fn glsl() -> String {
     ]
     .concat();
     let constants = [
+        ("PILOT_CELLS", PILOT_CELLS),
         ("PRIMITIVE_BOUNDARY", PRIMITIVE_BOUNDARY),
         ("PRIMITIVE_SPHERE", PRIMITIVE_SPHERE),
         ("SURFACE_TWO_SIDED", SURFACE_TWO_SIDED),

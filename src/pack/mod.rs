@@ -293,6 +293,7 @@ const EMPTY_FEATURES: Features = Features {
     mis: true,
     max_depth: 0,
     rr_depth: 0,
+    pilot: false,
     node_copies: 8,
     tree: true,
 };

@@ -140,6 +140,12 @@ pub struct Params {
     pub world_sigma_t: DVec3,
     pub film_width: u32,
     pub first_sky: u32,
+    pub pilot_origin: DVec3,
+    pub first_cell: u32,
+    pub pilot_scale: DVec3,
+    pub first_block: u32,
+    pub block_side: u32,
+    pub block_columns: u32,
 }
 
 impl Tables {
@@ -283,6 +289,12 @@ impl From<&layout::Params> for Params {
             world_sigma_t: from.world_sigma_t.as_dvec3(),
             film_width: from.film_width,
             first_sky: from.first_sky,
+            pilot_origin: from.pilot_origin.as_dvec3(),
+            first_cell: from.first_cell,
+            pilot_scale: from.pilot_scale.as_dvec3(),
+            first_block: from.first_block,
+            block_side: from.block_side,
+            block_columns: from.block_columns,
         }
     }
 }

@@ -13,6 +13,7 @@ pub mod film;
 pub mod light;
 pub mod math;
 pub mod medium;
+pub mod outlook;
 pub mod path;
 pub mod path_flight;
 pub mod path_lights;
@@ -91,7 +92,7 @@ impl Renderer {
             let value = trace(&self.tables, pixel, sample_index);
             sums.sum += value;
             sums.squares += value * value;
-            if let Some(cause) = invalid_cause(value) {
+            if let Some(cause) = invalid_cause(value, self.tables.features.pilot) {
                 sums.invalid[cause] += 1;
             }
         }
@@ -120,12 +121,12 @@ struct PixelSums {
 }
 
 /// Index in [`crate::render::INVALID_CAUSES`] of what is wrong with a sample.
-fn invalid_cause(value: DVec3) -> Option<usize> {
+fn invalid_cause(value: DVec3, may_be_negative: bool) -> Option<usize> {
     if value.is_nan() {
         Some(0)
     } else if !value.is_finite() {
         Some(1)
-    } else if value.min_element() < 0.0 {
+    } else if value.min_element() < 0.0 && !may_be_negative {
         Some(2)
     } else {
         None

@@ -6,6 +6,7 @@ use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::channel_weights;
+use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
 use super::path_flight::{end_flight, enter_medium, flight_point, flight_side, free_way, near_distance};
 use super::path_lights::{add_emission, add_medium_emission, add_sky, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
@@ -20,7 +21,7 @@ use crate::pack::layout::{
     LIGHT_VOLUME, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SMOOTH,
     SURFACE_TWO_SIDED,
 };
-use glam::{DVec2, DVec3, Vec4Swizzles};
+use glam::{DVec2, DVec3, UVec2, Vec4Swizzles};
 
 /// Depth at which roulette begins to end paths that lose nothing.
 const RELENTLESS_DEPTH: u32 = 256;
@@ -45,13 +46,45 @@ pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     path.radiance = DVec3::ZERO;
     path.alive = true;
     path.eta_scale = 1.0;
+    if tables.features.pilot {
+        let block = UVec2::new(column - params.crop_x, row - params.crop_y) / params.block_side;
+        let first = params.first_block + 4 * (block.y * params.block_columns + block.x);
+        path.focus = three_values(tables, first);
+    }
     path.left = NONE;
     path.medium = params.camera_medium;
     begin_segment(tables, &mut path, u.zw());
     path
 }
 
-/// Scatters at a vertex: the shadow ray, the next direction, roulette.
+/// Three numbers of the table.
+fn three_values(tables: &Tables, first: u32) -> DVec3 {
+    let first = first as usize;
+    DVec3::from([0, 1, 2].map(|k| f64::from(tables.values[first + k])))
+}
+
+/// Roulette at a vertex, by what the pilot expects of the rest of the path. Returns whether the path goes on.
+fn goes_on(tables: &Tables, path: &mut Path, vertex: &Vertex) -> bool {
+    let params = &tables.params;
+    let place = (vertex.point - params.pilot_origin) * params.pilot_scale;
+    let first = params.first_cell + 8 * outlook_cell(place, vertex.in_medium, vertex.axis);
+    let outlook = Outlook { mean: three_values(tables, first), worth: three_values(tables, first + 3) };
+    path.foreseen = outlook.worth.x >= 0.0;
+    let throughput = arriving_throughput(path, vertex);
+    let keep = if path.foreseen { keep_by_outlook(&outlook, throughput, path.focus) } else { 1.0 };
+    let set = if path.segment == 1 && tables.features.rr_depth > 1 { 2 } else { 2 * path.segment + 2 };
+    path.alive = sample_set(tables, path, set).x < keep;
+    path.radiance += throughput * outlook.mean * if path.alive { 1.0 - 1.0 / keep } else { 1.0 };
+    path.throughput /= keep;
+    path.alive
+}
+
+/// What the radiance that scatters at a vertex is multiplied with.
+pub fn arriving_throughput(path: &Path, vertex: &Vertex) -> DVec3 {
+    if vertex.in_medium { path.throughput * vertex.albedo } else { path.throughput }
+}
+
+/// Scatters at a vertex: the shadow ray and the next direction.
 fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     path.depth += 1;
     path.shadow = false;
@@ -87,7 +120,8 @@ fn next_segment(tables: &Tables, path: &mut Path) {
     let u = sample_set(tables, path, 2 * path.segment);
     if path.depth >= tables.features.rr_depth {
         let most = if path.depth < RELENTLESS_DEPTH { 1.0 } else { 1.0 - 2.0 / f64::from(path.depth) };
-        let keep = (3.0 * max_component(path.throughput) * path.eta_scale).min(most);
+        let worth = 3.0 * max_component(path.throughput) * path.eta_scale;
+        let keep = if path.foreseen { most } else { worth.min(most) };
         path.alive = path.alive && u.x < keep;
         path.throughput /= keep;
     }
@@ -207,10 +241,19 @@ fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
 
 /// Answers the ray that the path asked for.
 pub fn path_answer(tables: &Tables, path: &mut Path, hit: &Hit) {
+    path_answer_seen(tables, path, hit, |_, _| ());
+}
+
+/// The same, for an observer of the vertices that the path scatters at.
+pub fn path_answer_seen(tables: &Tables, path: &mut Path, hit: &Hit, see: impl FnOnce(&Path, &Vertex)) {
     if path.shadow {
         path_light(tables, path, hit);
     } else {
         let Some(vertex) = meet(tables, path, hit) else { return };
+        see(path, &vertex);
+        if tables.features.pilot && path.depth > 0 && !goes_on(tables, path, &vertex) {
+            return;
+        }
         scatter(tables, path, &vertex);
     }
     if path.alive && !path.shadow {

@@ -92,6 +92,10 @@ pub struct Path {
     pub left: u32,
     /// The medium of the next segment.
     pub next_medium: u32,
+    /// For roulette by a pilot: one over the square of the pixel's radiance.
+    pub focus: DVec3,
+    /// The pilot knows the vertex.
+    pub foreseen: bool,
     /// The product of squared indices that refraction divided radiance by.
     pub eta_scale: f64,
 }

@@ -20,6 +20,7 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "intersect_triangle barycentric", relative: 0.0, absolute: 5e-6 },
     Tolerance { function: "intersect_sphere", relative: 2e-6, absolute: 0.0 },
     Tolerance { function: "nearest hit", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "keep_by_outlook", relative: 1e-6, absolute: 0.0 },
     Tolerance { function: "channel_weights", relative: 4e-7, absolute: 0.0 },
     Tolerance { function: "free_flight", relative: 2e-7, absolute: 0.0 },
     Tolerance { function: "survival_probability", relative: 6e-7, absolute: 2e-38 },

@@ -1,0 +1,278 @@
+//! A pilot: a few thousand paths before a render, on the CPU, that tell the renderer where paths are worth their time.
+//!
+//! The pilot follows paths of the reference ([`crate::reference`]) and remembers, for each vertex, what the rest of the path brought
+//! and how many rays it took. Means and variances over cells of space drive the roulette of `shaders/lib/outlook.glsl`: a path may end
+//! at a vertex with what was expected of it there, and goes on for the difference with the probability
+//!
+//! q = √(Σ_c (β_c / I_c)² V_c / 3 / C) · √(C_image / V_image),
+//!
+//! where β is its throughput, I the pixel's radiance, V the variance of what the rest of a path from that cell brings, and C the rays it
+//! takes (Rath, Grittmann, Herholz, Weier and Slusallek 2022, "EARS: Efficiency-Aware Russian Roulette and Splitting", eq. 8 and 12;
+//! Bolin and Meyer 1997). Rath et al. roll for a path's radiance, which costs its second moment; a path that ends with its
+//! expectation costs only its variance, so far more paths can end early. Whatever the pilot says, the expected image stays the same.
+//!
+//! The pilot has seeds of its own and depends on the scene alone, so the samples of a render can be split and merged as ever.
+
+use crate::pack::Packed;
+use crate::pack::layout::PILOT_CELLS;
+use crate::reference::bindings::Tables;
+use crate::reference::outlook::outlook_cell;
+use crate::reference::path::{arriving_throughput, path_answer_seen, path_start};
+use crate::reference::traverse;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Films with fewer pixels are rendered before a pilot would be.
+const LEAST_PIXELS: usize = 4096;
+/// Paths that may not get deeper than this are short anyway.
+const LEAST_MAX_DEPTH: u32 = 8;
+/// Scenes with more primitives are not copied for a pilot.
+const MOST_PRIMITIVES: usize = 4_000_000;
+/// The film is divided into blocks of pixels, at most this many on a side.
+const MOST_BLOCKS: u32 = 32;
+/// Paths of each block.
+const PATHS_PER_BLOCK: u32 = 16;
+/// No further path is begun for each block after this many rays.
+const MOST_RAYS: u64 = 400_000;
+/// A path of the pilot ends after this many rays, whatever it loses.
+const MOST_RAYS_OF_A_PATH: u32 = 400;
+/// A cell with fewer vertices tells nothing.
+const LEAST_VERTICES: f64 = 4.0;
+/// A cell's variance is taken together with as many vertices of the average over all cells.
+const PRIOR_VERTICES: f64 = 4.0;
+/// Share of the image's mean radiance below which a pixel does not count as darker.
+const FLOOR: f64 = 0.1;
+/// A render's first dimensions are stratified, the pilot's are not: its variance is this many times that of a render (measured: 2 is
+/// better than 1 or 4 for 64 samples a pixel).
+const STRATIFIED: f64 = 2.0;
+/// Seed of the pilot's random numbers, apart from those of renders.
+const SEED: u32 = 0x7079_6c74;
+
+/// One vertex of a path, and what came after it.
+struct Vertex {
+    point: DVec3,
+    in_medium: bool,
+    axis: DVec3,
+    throughput: DVec3,
+    /// For a throughput of 1.
+    brought: DVec3,
+    rays: f64,
+}
+
+/// One path.
+struct Trail {
+    block: usize,
+    radiance: DVec3,
+    rays: f64,
+    vertices: Vec<Vertex>,
+}
+
+/// Sums over the vertices of one cell.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    count: f64,
+    sum: DVec3,
+    squares: DVec3,
+    rays: f64,
+}
+
+/// How the film is divided.
+#[derive(Clone, Copy)]
+struct Blocks {
+    side: u32,
+    columns: u32,
+    rows: u32,
+}
+
+/// Runs a pilot and adds what it found to the tables of a scene. Scenes that gain nothing by it stay as they are.
+pub fn run(packed: &mut Packed) {
+    let large = packed.pixel_count() >= LEAST_PIXELS && packed.features.max_depth >= LEAST_MAX_DEPTH;
+    if !large || packed.primitives.len() > MOST_PRIMITIVES {
+        return;
+    }
+    let mut tables = Tables::new(packed);
+    tables.params.seed = SEED;
+    let params = &packed.params;
+    let side = params.crop_width.max(params.crop_height).div_ceil(MOST_BLOCKS);
+    let blocks = Blocks { side, columns: params.crop_width.div_ceil(side), rows: params.crop_height.div_ceil(side) };
+    let trails = follow(&tables, blocks);
+    if let Some(found) = Found::of(&trails, blocks) {
+        found.add_to(packed, blocks);
+    }
+}
+
+/// Follows one path for each block, and again until there are enough. The order of the result does not depend on the threads.
+fn follow(tables: &Tables, blocks: Blocks) -> Vec<Trail> {
+    let mut trails = Vec::new();
+    let mut rays = 0;
+    for round in 0..PATHS_PER_BLOCK {
+        let of_round: Vec<Trail> = (0..blocks.columns * blocks.rows)
+            .into_par_iter()
+            .map(|block| follow_one(tables, blocks, block, round))
+            .collect();
+        rays += of_round.iter().map(|trail| trail.rays as u64).sum::<u64>();
+        trails.extend(of_round);
+        if rays > MOST_RAYS {
+            break;
+        }
+    }
+    trails
+}
+
+fn follow_one(tables: &Tables, blocks: Blocks, block: u32, round: u32) -> Trail {
+    let params = &tables.params;
+    // The pixels of a block in turn.
+    let place = round * (blocks.side * blocks.side).div_ceil(PATHS_PER_BLOCK).max(1) % (blocks.side * blocks.side);
+    let x = block % blocks.columns * blocks.side + place % blocks.side;
+    let y = block / blocks.columns * blocks.side + place / blocks.side;
+    let (x, y) = (x.min(params.crop_width - 1), y.min(params.crop_height - 1));
+    let mut path = path_start(tables, (y + params.crop_y) * params.film_width + x + params.crop_x, round);
+    let mut rays = 0;
+    // With what the path had gathered, and after how many rays.
+    let mut vertices: Vec<Vertex> = Vec::new();
+    while (path.alive || path.shadow) && rays < MOST_RAYS_OF_A_PATH {
+        rays += 1;
+        let hit = traverse(tables, &path);
+        path_answer_seen(tables, &mut path, &hit, |path, vertex| {
+            vertices.push(Vertex {
+                point: vertex.point,
+                in_medium: vertex.in_medium,
+                axis: vertex.axis,
+                throughput: arriving_throughput(path, vertex),
+                brought: path.radiance,
+                rays: f64::from(rays),
+            });
+        });
+    }
+    for vertex in &mut vertices {
+        let gained = (path.radiance - vertex.brought) / vertex.throughput;
+        vertex.brought = DVec3::select(vertex.throughput.cmpgt(DVec3::splat(1e-9)), gained, DVec3::ZERO);
+        vertex.rays = f64::from(rays) - vertex.rays;
+    }
+    vertices.retain(|vertex| vertex.brought.is_finite() && vertex.point.is_finite());
+    Trail { block: block as usize, radiance: path.radiance, rays: f64::from(rays), vertices }
+}
+
+/// What the trails say.
+struct Found {
+    origin: DVec3,
+    scale: DVec3,
+    /// Of each cell the mean and the worth, or a worth of −1.
+    cells: Vec<[DVec3; 2]>,
+    /// Of each block one over the square of its radiance.
+    focus: Vec<DVec3>,
+}
+
+impl Found {
+    /// Nothing, if the image is black or has no variance, or if no path scatters.
+    fn of(trails: &[Trail], blocks: Blocks) -> Option<Found> {
+        let finite = || trails.iter().filter(|trail| trail.radiance.is_finite());
+        let count = finite().count() as f64;
+        let mean = finite().map(|trail| trail.radiance).sum::<DVec3>() / count;
+        let floor = FLOOR * mean.element_sum() / 3.0;
+        let mut sums = vec![(DVec3::ZERO, 0.0); (blocks.columns * blocks.rows) as usize];
+        for trail in finite() {
+            let (sum, count) = &mut sums[trail.block];
+            *sum += trail.radiance;
+            *count += 1.0;
+        }
+        let of_block: Vec<DVec3> = sums.iter().map(|(sum, count)| *sum / f64::max(*count, 1.0)).collect();
+        let focus: Vec<DVec3> =
+            of_block.iter().map(|mean| (*mean * *mean + DVec3::splat(floor * floor)).recip()).collect();
+        let relative = |trail: &Trail| {
+            let difference = trail.radiance - of_block[trail.block];
+            (difference * difference * focus[trail.block]).element_sum() / 3.0
+        };
+        let variance = finite().map(relative).sum::<f64>() / count;
+        let rays = trails.iter().map(|trail| trail.rays).sum::<f64>() / trails.len() as f64;
+        let efficiency = STRATIFIED * rays / variance;
+        let (origin, scale) = cells_of_space(trails)?;
+        if !(efficiency.is_finite() && floor > 0.0 && scale.is_finite()) {
+            return None;
+        }
+        let cells = cells(trails, origin, scale);
+        Some(Found { origin, scale, cells: weigh(&cells, efficiency), focus })
+    }
+
+    fn add_to(&self, packed: &mut Packed, blocks: Blocks) {
+        let numbers = 8 * self.cells.len() + 4 * self.focus.len();
+        if packed.values.len() + numbers > u32::MAX as usize {
+            return;
+        }
+        packed.params.pilot_origin = self.origin.as_vec3();
+        packed.params.pilot_scale = self.scale.as_vec3();
+        packed.params.block_side = blocks.side;
+        packed.params.block_columns = blocks.columns;
+        packed.params.first_cell = packed.values.len() as u32;
+        let pad = |v: &DVec3| v.as_vec3().min(Vec3::splat(1e30));
+        packed.values.extend(self.cells.iter().flat_map(|[mean, worth]| {
+            let (mean, worth) = (pad(mean), pad(worth));
+            [mean.x, mean.y, mean.z, worth.x, worth.y, worth.z, 0.0, 0.0]
+        }));
+        packed.params.first_block = packed.values.len() as u32;
+        packed.values.extend(self.focus.iter().flat_map(|focus| {
+            let focus = pad(focus);
+            [focus.x, focus.y, focus.z, 0.0]
+        }));
+        packed.features.pilot = true;
+    }
+}
+
+/// Lower corner and cells per unit of a box about nearly all vertices.
+fn cells_of_space(trails: &[Trail]) -> Option<(DVec3, DVec3)> {
+    let points: Vec<DVec3> = trails.iter().flat_map(|trail| &trail.vertices).map(|vertex| vertex.point).collect();
+    if points.is_empty() {
+        return None;
+    }
+    let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
+    for axis in 0..3 {
+        let mut along: Vec<f64> = points.iter().map(|point| point[axis]).collect();
+        along.sort_by(f64::total_cmp);
+        let outside = along.len() / 200;
+        low[axis] = along[outside];
+        high[axis] = along[along.len() - 1 - outside];
+    }
+    let size = (high - low).max(DVec3::splat((high - low).max_element().max(1e-6) * 1e-3));
+    // A wall at the border must not fall into two cells by rounding.
+    Some((low - size * 1e-2, f64::from(PILOT_CELLS) / (size * 1.02)))
+}
+
+fn cells(trails: &[Trail], origin: DVec3, scale: DVec3) -> Vec<Cell> {
+    let mut cells = vec![Cell::default(); (PILOT_CELLS * PILOT_CELLS * PILOT_CELLS * 7) as usize];
+    for vertex in trails.iter().flat_map(|trail| &trail.vertices) {
+        let index = outlook_cell((vertex.point - origin) * scale, vertex.in_medium, vertex.axis);
+        let cell = &mut cells[index as usize];
+        cell.count += 1.0;
+        cell.sum += vertex.brought;
+        cell.squares += vertex.brought * vertex.brought;
+        cell.rays += vertex.rays;
+    }
+    cells
+}
+
+/// Mean and worth of each cell.
+fn weigh(cells: &[Cell], efficiency: f64) -> Vec<[DVec3; 2]> {
+    let variance = |cell: &Cell| {
+        let mean = cell.sum / cell.count;
+        (cell.squares / cell.count - mean * mean).max(DVec3::ZERO) * cell.count / (cell.count - 1.0).max(1.0)
+    };
+    // The averages over surfaces and over media.
+    let mut priors = [(0.0, DVec3::ZERO, 0.0); 2];
+    for (index, cell) in cells.iter().enumerate().filter(|(_, cell)| cell.count > 0.0) {
+        let (count, sum, rays) = &mut priors[usize::from(index % 7 == 6)];
+        *count += cell.count;
+        *sum += variance(cell) * cell.count;
+        *rays += cell.rays;
+    }
+    let found = cells.iter().enumerate().map(|(index, cell)| {
+        if cell.count < LEAST_VERTICES {
+            return [DVec3::ZERO, DVec3::NEG_ONE];
+        }
+        let (count, sum, rays) = priors[usize::from(index % 7 == 6)];
+        let together = cell.count + PRIOR_VERTICES;
+        let variance = (variance(cell) * cell.count + sum / count * PRIOR_VERTICES) / together;
+        let rays = (cell.rays + rays / count * PRIOR_VERTICES) / together;
+        [cell.sum / cell.count, variance * efficiency / (3.0 * rays.max(1.0))]
+    });
+    found.collect()
+}
