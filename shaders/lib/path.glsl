@@ -17,6 +17,7 @@
 #include "lib/path_rays.glsl"
 #include "lib/path_flight.glsl"
 #include "lib/camera.glsl"
+#include "lib/filter.glsl"
 
 // Depth at which roulette begins to end paths that lose nothing, so that a closed scene without absorption ends. A path gets
 // to depth d with a probability near (RELENTLESS_DEPTH / d)²: slowly enough for dense media that absorb nothing, in which the number
@@ -26,10 +27,24 @@ const uint RELENTLESS_DEPTH = 256u;
 // The sets of random numbers by which light meets masks or passes them begin here, beyond those of any segment.
 const uint MASK_SETS = 0x80000000u;
 
+// Where a sample of the pixel with the given centre lies on the film, in pixels, and its factor by the filter.
+vec2 filtered_place(inout Path path, vec2 center, vec2 u) {
+    vec2 low = params.sample_area_begin - center, high = params.sample_area_end - center;
+    FilterSample x = sample_filter(params.first_filter_value, params.filter_cells, params.filter_radius, vec2(low.x, high.x), u.x);
+    FilterSample y = sample_filter(params.first_filter_value, params.filter_cells, params.filter_radius, vec2(low.y, high.y), u.y);
+    path.filter_weight = x.weight * y.weight;
+    return center + vec2(x.offset, y.offset);
+}
+
 void path_start(inout Path path) {
     vec4 u = sample_set(path, 0u);
     uint row = path.pixel / params.film_width, column = path.pixel - row * params.film_width;
-    vec2 film = (vec2(column, row) + u.xy) * vec2(params.inverse_width, params.inverse_height);
+    vec2 place = vec2(column, row) + u.xy;
+    path.filter_weight = 1.0;
+    if (HAS_FILTER && params.filter_cells > 0u) {
+        place = filtered_place(path, vec2(column, row) + 0.5, u.xy);
+    }
+    vec2 film = place * vec2(params.inverse_width, params.inverse_height);
     vec3 direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
     float depth_to_distance = length(direction);
     path.origin = params.camera_origin;

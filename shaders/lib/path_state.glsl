@@ -13,6 +13,7 @@ const uint EMISSION_SETS = 0x80000000u;
 struct Path {
     uint pixel;             // of the whole film
     uint sample_index;
+    float filter_weight;    // where the filter is wide: factor of the radiance; negative in its negative lobes
     // The ray that is asked for.
     vec3 origin;
     vec3 direction;

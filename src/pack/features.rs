@@ -63,6 +63,8 @@ pub struct Features {
     pub masks: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
+    /// A reconstruction filter other than a box of one pixel.
+    pub filter: bool,
     /// Emitters are not seen by the camera directly.
     pub hide_emitters: bool,
     /// Light is sampled at the vertices of paths.
@@ -122,6 +124,7 @@ impl Features {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
             },
+            filter: packed.params.filter_cells != 0,
             hide_emitters,
             // Where the only light is a constant sky and nothing absorbs on the way, scattered rays find it just as well.
             light_sampling: max_depth > 1
@@ -164,6 +167,7 @@ impl Features {
             shading_normals: true,
             masks: true,
             far_clip: true,
+            filter: true,
             ..self
         }
     }
@@ -201,6 +205,7 @@ impl Features {
             ("HAS_SHADING_NORMALS", self.shading_normals),
             ("HAS_MASK", self.masks),
             ("HAS_FAR_CLIP", self.far_clip),
+            ("HAS_FILTER", self.filter),
             ("HAS_HIDDEN_EMITTERS", self.hide_emitters),
             ("HAS_LIGHT_SAMPLING", self.light_sampling),
             ("HAS_MIS", self.mis),

@@ -329,6 +329,18 @@ gpu_struct! {
         world_sigma_t: Vec3,
         /// Index of the first light that shines from all directions; these come last in the table.
         first_sky: u32,
+        /// Of a filter wider than a pixel: where its samples may lie begins here, in pixels of the film.
+        sample_area_begin: Vec2,
+        /// Where it ends.
+        sample_area_end: Vec2,
+        /// Index among the values of the filter's distribution: one more number than cells, and as many of its signed form.
+        first_filter_value: u32,
+        /// Cells of the table, from one end of the filter to the other.
+        filter_cells: u32,
+        /// Distance from the pixel's centre to the filter's ends, in pixels.
+        filter_radius: f32,
+        /// Fills the sixteen bytes.
+        unused_filter: u32,
     }
 }
 

@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3, Vec3};
 pub mod bvh;
 pub mod emission;
 pub mod features;
+pub mod filter;
 mod flight;
 pub mod frame;
 pub mod layout;
@@ -177,6 +178,7 @@ impl Packed {
         let lights = lights.finish();
         flight::choose_equiangular(scene, &nesting, &frame, &lights, &mut media);
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
+        filter::pack(&scene.film, &mut params, &mut values);
         params = Params {
             seed,
             grid_origin: bvh.grid_origin,
@@ -246,6 +248,7 @@ const EMPTY_FEATURES: Features = Features {
     shading_normals: false,
     masks: false,
     far_clip: false,
+    filter: false,
     hide_emitters: false,
     light_sampling: false,
     mis: true,

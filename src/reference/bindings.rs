@@ -2,7 +2,7 @@
 
 use crate::pack::features::Features;
 use crate::pack::{Packed, layout, sobol};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// What the kernel reads.
 #[derive(Clone, Debug)]
@@ -138,6 +138,11 @@ pub struct Params {
     pub world_sigma_t: DVec3,
     pub film_width: u32,
     pub first_sky: u32,
+    pub sample_area_begin: DVec2,
+    pub sample_area_end: DVec2,
+    pub first_filter_value: u32,
+    pub filter_cells: u32,
+    pub filter_radius: f64,
 }
 
 impl Tables {
@@ -280,6 +285,11 @@ impl From<&layout::Params> for Params {
             world_sigma_t: from.world_sigma_t.as_dvec3(),
             film_width: from.film_width,
             first_sky: from.first_sky,
+            sample_area_begin: from.sample_area_begin.as_dvec2(),
+            sample_area_end: from.sample_area_end.as_dvec2(),
+            first_filter_value: from.first_filter_value,
+            filter_cells: from.filter_cells,
+            filter_radius: f64::from(from.filter_radius),
         }
     }
 }

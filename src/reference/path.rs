@@ -1,9 +1,10 @@
 //! Mirror of `shaders/lib/path.glsl`: the estimator, a path as a coroutine that asks for one ray at a time. A path's
 //! life is described there. What the kernel leaves out where a scene does not need it is always here.
 
-use super::bindings::{Medium, Surface, Tables};
+use super::bindings::{Medium, Params, Surface, Tables};
 use super::bsdf::bsdf_has_density;
 use super::camera::camera_direction;
+use super::filter::sample_filter;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::channel_weights;
 use super::path_flight::{end_flight, enter_medium, flight_point, free_way, near_distance};
@@ -27,14 +28,32 @@ const RELENTLESS_DEPTH: u32 = 256;
 /// The sets of random numbers by which light meets masks or passes them begin here.
 const MASK_SETS: u32 = 0x8000_0000;
 
+/// Where a sample of the pixel with the given upper left corner lies on the film, in pixels, and its factor by the filter.
+fn filtered_place(tables: &Tables, path: &mut Path, corner: DVec2, u: DVec2) -> DVec2 {
+    path.filter_weight = 1.0;
+    let Params { sample_area_begin, sample_area_end, first_filter_value, filter_cells, filter_radius, .. } =
+        tables.params;
+    if filter_cells == 0 {
+        return corner + u;
+    }
+    let center = corner + 0.5;
+    let (low, high) = (sample_area_begin - center, sample_area_end - center);
+    let values = &tables.values[first_filter_value as usize..];
+    let x = sample_filter(values, filter_cells, filter_radius, DVec2::new(low.x, high.x), u.x);
+    let y = sample_filter(values, filter_cells, filter_radius, DVec2::new(low.y, high.y), u.y);
+    path.filter_weight = x.weight * y.weight;
+    center + DVec2::new(x.offset, y.offset)
+}
+
 /// A ray from the camera, and a free flight for its first segment.
 pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     let mut path = Path { pixel, sample_index, ..Path::default() };
     let params = &tables.params;
     let u = sample_set(tables, &path, 0);
     let (row, column) = (pixel / params.film_width, pixel % params.film_width);
-    let film = (DVec2::new(f64::from(column), f64::from(row)) + u.xy())
-        * DVec2::new(params.inverse_width, params.inverse_height);
+    let corner = DVec2::new(f64::from(column), f64::from(row));
+    let place = filtered_place(tables, &mut path, corner, u.xy());
+    let film = place * DVec2::new(params.inverse_width, params.inverse_height);
     let direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
     let depth_to_distance = direction.length();
     path.origin = params.camera_origin;

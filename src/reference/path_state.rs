@@ -26,6 +26,8 @@ pub struct Path {
     pub pixel: u32,
     /// Of the pixel.
     pub sample_index: u32,
+    /// Factor of the radiance by the reconstruction filter; negative in its negative lobes.
+    pub filter_weight: f64,
     /// Of the ray that is asked for.
     pub origin: DVec3,
     /// Of the ray that is asked for; unit.

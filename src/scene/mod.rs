@@ -22,6 +22,7 @@ pub mod bitmap;
 mod bsdf;
 pub mod check;
 mod error;
+mod filter;
 pub mod mesh;
 pub mod mitsuba;
 mod phase;
@@ -31,6 +32,7 @@ mod texture;
 pub use bitmap::Bitmap;
 pub use bsdf::{Bsdf, Distribution, Roughness};
 pub use error::SceneError;
+pub use filter::ReconstructionFilter;
 pub use phase::Phase;
 pub use texture::{Filter, Texture, Wrap};
 
@@ -122,8 +124,8 @@ pub fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> DMat4 {
     DMat4::from_cols(left.extend(0.0), true_up.extend(0.0), forward.extend(0.0), origin.extend(1.0))
 }
 
-/// The film: `width × height` pixels, of which the crop window is rendered. The filter is a box of one pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The film: `width × height` pixels, of which the crop window is rendered.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Film {
     /// Pixels in a row of the whole film.
     pub width: u32,
@@ -131,6 +133,11 @@ pub struct Film {
     pub height: u32,
     /// The part that is rendered and written.
     pub crop: Crop,
+    /// How the samples about a pixel make up its value.
+    pub filter: ReconstructionFilter,
+    /// Where the samples of a filter that is wider than a pixel may lie: at the edges of this part of the film the filter is
+    /// cut off, and what is left of it normalised. `None` lets samples lie beyond the edges of the film.
+    pub sample_area: Option<Crop>,
 }
 
 impl Film {
@@ -140,9 +147,10 @@ impl Film {
     /// Most pixels in a crop window. One block of samples holds 24 bytes a pixel, 6.4 GB at this limit.
     pub const MAX_PIXELS: u64 = 1 << 28;
 
-    /// A film that is rendered whole.
+    /// A film that is rendered whole, with a box filter of one pixel.
     pub fn new(width: u32, height: u32) -> Self {
-        Film { width, height, crop: Crop { x: 0, y: 0, width, height } }
+        let crop = Crop { x: 0, y: 0, width, height };
+        Film { width, height, crop, filter: ReconstructionFilter::PIXEL, sample_area: Some(crop) }
     }
 }
 

@@ -28,7 +28,7 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
     let film = match props.child(Kind::Film)? {
         Some(film) => film::convert(context, film)?,
         None => {
-            let text = "the sensor has no film; it gets Mitsuba's of 768 x 576 pixels, with a box filter";
+            let text = "the sensor has no film; it gets Mitsuba's of 768 x 576 pixels";
             context.warnings.push(child.object.at.warning(text));
             film::default_film()
         }
