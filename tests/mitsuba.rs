@@ -5,9 +5,11 @@ mod common;
 
 use common::images::{Image, average, by_reference, mean, on_device, with_variant};
 use common::scenes::pack;
+use glam::DVec3;
 use std::path::Path;
 use tyndall::gpu::shader::Variant;
-use tyndall::scene::{Film, Light, ReconstructionFilter, Scene, mitsuba};
+use tyndall::pack::{PackError, Packed};
+use tyndall::scene::{Film, Geometry, Lens, Light, Medium, Phase, ReconstructionFilter, Scene, Shape, mitsuba};
 
 /// A scene of `tests/data/mitsuba` with parameters.
 fn load(name: &str, parameters: &[(&str, &str)]) -> Scene {
@@ -151,4 +153,95 @@ fn a_box_of_one_pixel_costs_nothing_and_is_the_filter_of_the_general_kernel() {
         Variant { features: general.features, workgroup: common::device().subgroup_size, buffer_reference: false };
     let image = mean(&with_variant(&general, 4096, &variant));
     assert_eq!(farthest(&image, &EDGES[0].2, 6e-3), None);
+}
+
+/// Expected values with a standard error near 0.001: `mitsuba sensors.xml camera=…`, the mean of 16 renders of 65,536 samples.
+const CAMERAS: [(&str, [f64; 24]); 3] = [
+    (
+        "perspective",
+        [
+            0.0000, 0.0000, 0.0017, 0.0000, 0.0000, 0.0000, 0.0000, 0.0000, 1.2777, 1.6064, 0.9132, 0.0000, 0.0000,
+            0.2814, 1.9748, 2.0000, 0.8259, 0.0000, 0.6210, 0.6262, 1.8455, 1.7949, 0.0594, 0.0000,
+        ],
+    ),
+    (
+        "thinlens",
+        [
+            1.9987, 2.0000, 2.0000, 0.5841, 0.0000, 0.0000, 1.8886, 2.0000, 2.0000, 1.5375, 0.0007, 0.0009, 1.1151,
+            2.0000, 2.0000, 1.9982, 0.4784, 0.2516, 0.2322, 1.9134, 1.8739, 0.7751, 0.2999, 0.7557,
+        ],
+    ),
+    (
+        "orthographic",
+        [
+            1.4744, 2.0000, 1.9935, 0.2717, 0.0000, 0.0000, 0.7492, 2.0000, 2.0000, 0.9869, 0.0000, 0.0000, 0.0877,
+            1.8953, 2.0000, 1.6432, 0.5224, 0.0000, 0.0000, 1.2193, 1.9902, 1.2473, 0.9513, 0.0163,
+        ],
+    ),
+];
+
+#[test]
+fn cameras_have_the_expected_pixels_of_mitsuba() {
+    for (name, expected) in CAMERAS {
+        let packed = pack(&load("sensors.xml", &[("camera", name)]), 3);
+        assert_eq!((packed.features.lens, packed.features.orthographic), (name == "thinlens", name == "orthographic"));
+        // Four dimensions make more noise than two.
+        let (spp, tolerance) = if packed.features.lens { (32_768, 1e-2) } else { (8192, 6e-3) };
+        assert_eq!(farthest(&on_device(&packed, spp), &expected, tolerance), None, "{name}");
+        assert_eq!(farthest(&by_reference(&packed, spp), &expected, tolerance), None, "{name}");
+        // The planted fault: mirrored pictures.
+        let mirrored: Vec<f64> = expected.chunks(6).flat_map(|row| row.iter().rev().copied()).collect();
+        assert!(farthest(&on_device(&packed, 1024), &mirrored, 6e-3).is_some(), "{name}");
+    }
+}
+
+#[test]
+fn a_lens_without_width_is_a_pinhole() {
+    let scene = load("sensors.xml", &[("camera", "thinlens")]);
+    let mut narrow = scene.clone();
+    narrow.camera.lens = Lens::Thin { aperture_radius: 1e-9, focus_distance: 5.5 };
+    let mut pinhole = scene.clone();
+    pinhole.camera.lens = Lens::Pinhole;
+    let (narrow, pinhole) = (pack(&narrow, 3), pack(&pinhole, 3));
+    assert!(narrow.features.lens && !pinhole.features.lens);
+    let difference =
+        |a: &Image, b: &Image| a.iter().zip(b).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f64::max);
+    let plain = on_device(&pinhole, 256);
+    assert!(difference(&on_device(&narrow, 256), &plain) < 0.02);
+    assert!(difference(&on_device(&pack(&scene, 3), 256), &plain) > 0.2, "a wide lens blurs");
+}
+
+#[test]
+fn rays_that_would_begin_in_different_media_are_refused() {
+    let mut scene = load("sensors.xml", &[("camera", "orthographic")]);
+    let fog = scene.add_medium(Medium::new("fog", DVec3::ONE, DVec3::ONE, Phase::HenyeyGreenstein { g: 0.0 }));
+    let eye = scene.camera.to_world.w_axis.truncate();
+    let forward = scene.camera.to_world.z_axis.truncate();
+    let start = eye + forward * scene.camera.near_clip;
+    let ball = |center: DVec3, radius: f64| Geometry::Sphere { center, radius, flipped: false };
+    let with = |geometry: Geometry, lens: Lens| {
+        let mut scene = scene.clone();
+        scene.shapes.push(Shape::boundary("fog", geometry, fog));
+        scene.camera.lens = lens;
+        Packed::new(&scene, 1).map(|packed| packed.params.camera_medium)
+    };
+    let rectangle = scene.camera.lens;
+    let lens = Lens::Thin { aperture_radius: 0.4, focus_distance: 5.5 };
+    let cube = |center: DVec3, half: f64| {
+        common::scenes::cuboid(glam::DMat4::from_translation(center) * glam::DMat4::from_scale(DVec3::splat(half)))
+    };
+    let refused = Err(PackError::StraddlingCamera("fog".to_owned()));
+    assert_eq!(with(ball(start, 0.3), rectangle), refused);
+    assert_eq!(with(cube(start, 0.3), rectangle), refused);
+    assert_eq!(with(ball(start, 0.1), lens), refused);
+    // A pinhole has one place where rays begin, and large or distant shapes do not cut it.
+    assert_eq!(with(ball(start, 0.3), Lens::Pinhole), Ok(1));
+    for around in [ball(start, 9.0), cube(start, 9.0)] {
+        assert_eq!(with(around.clone(), rectangle), Ok(1));
+        assert_eq!(with(around, lens), Ok(1));
+    }
+    for distant in [ball(start + forward * 3.0, 1.0), cube(start - forward * 4.0, 1.0)] {
+        assert_eq!(with(distant.clone(), rectangle), Ok(0));
+        assert_eq!(with(distant, lens), Ok(0));
+    }
 }

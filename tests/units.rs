@@ -425,21 +425,25 @@ fn cameras() {
     for _ in 0..1000 {
         let [corner, right, down] = [0; 3].map(|_| narrow(random.in_cube()).map(f64::from));
         inputs.extend([corner, right, down].map(|vector| vec4(&vector)));
-        inputs.push(vec4(&[random.unit(), random.unit()]));
+        inputs.push(vec4(&[random.unit(), random.unit(), random.unit(), random.unit()]));
     }
     let count = inputs.len() / 4;
-    let outputs: Vec<[f32; 4]> = run("camera", &inputs, &[], count, count);
+    let outputs: Vec<[f32; 4]> = run("camera", &inputs, &[], count, 3 * count);
     let mut direction = comparison("camera_direction");
-    for (input, output) in inputs.chunks(4).zip(&outputs) {
+    let (mut point, mut focused) = (comparison("lens_point"), comparison("focused_direction"));
+    for (input, output) in inputs.chunks(4).zip(outputs.chunks(3)) {
         let [corner, right, down] = [0, 1, 2].map(|k| widen(&input[k][..3]));
         let film = DVec2::new(f64::from(input[3][0]), f64::from(input[3][1]));
         let expected = camera::camera_direction(corner, right, down, film);
         // Relative to the vectors that are added, which may cancel.
         if expected.length() > 0.5 {
-            direction.vector(format!("{input:?}"), &output[..3], expected);
+            direction.vector(format!("{input:?}"), &output[0][..3], expected);
         }
+        let place = camera::lens_point(right, down, DVec2::new(f64::from(input[3][2]), f64::from(input[3][3])));
+        point.vector(format!("{input:?}"), &output[1][..3], place);
+        focused.vector(format!("{input:?}"), &output[2][..3], camera::focused_direction(expected, place, 0.5));
     }
-    direction.finish();
+    [direction, point, focused].into_iter().for_each(Comparison::finish);
 }
 
 #[test]

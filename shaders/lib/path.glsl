@@ -46,8 +46,16 @@ void path_start(inout Path path) {
     }
     vec2 film = place * vec2(params.inverse_width, params.inverse_height);
     vec3 direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
-    float depth_to_distance = length(direction);
     path.origin = params.camera_origin;
+    if (HAS_ORTHOGRAPHIC) {
+        path.origin += direction;
+        direction = params.lens_u;
+    } else if (HAS_LENS) {
+        vec3 point = lens_point(params.lens_u, params.lens_v, sample_lens(path).xy);
+        path.origin += point;
+        direction = focused_direction(direction, point, params.inverse_focus);
+    }
+    float depth_to_distance = length(direction);
     path.direction = direction / depth_to_distance;
     path.t_min = params.near_clip * depth_to_distance;
     path.far_end = HAS_FAR_CLIP ? params.far_clip * depth_to_distance : INFINITE_DISTANCE;

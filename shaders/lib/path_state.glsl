@@ -79,6 +79,12 @@ vec4 sample_set(Path path, uint set) {
     return shifted_point(point, key);
 }
 
+// The numbers for a camera's lens.
+vec4 sample_lens(Path path) {
+    uvec4 key = lens_key(params.seed, path.pixel, path.sample_index);
+    return shifted_point(POINT(point_index(LENS_SET, path.sample_index, key)), key);
+}
+
 uint valid_medium(uint medium) {
     return medium < params.medium_count ? medium : 0u;
 }

@@ -2,7 +2,7 @@
 
 use super::Packed;
 use super::layout::*;
-use crate::scene::{Integrator, Scene};
+use crate::scene::{Integrator, Lens, Scene};
 
 /// Constants of the kernel, decided once for a scene. Each becomes a `const` of `features.glsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +63,10 @@ pub struct Features {
     pub masks: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
+    /// A camera with a thin lens.
+    pub lens: bool,
+    /// A camera whose rays are parallel.
+    pub orthographic: bool,
     /// A reconstruction filter other than a box of one pixel.
     pub filter: bool,
     /// Emitters are not seen by the camera directly.
@@ -124,6 +128,8 @@ impl Features {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
             },
+            lens: matches!(scene.camera.lens, Lens::Thin { .. }),
+            orthographic: matches!(scene.camera.lens, Lens::Orthographic { .. }),
             filter: packed.params.filter_cells != 0,
             hide_emitters,
             // Where the only light is a constant sky and nothing absorbs on the way, scattered rays find it just as well.
@@ -167,6 +173,7 @@ impl Features {
             shading_normals: true,
             masks: true,
             far_clip: true,
+            lens: true,
             filter: true,
             ..self
         }
@@ -205,6 +212,8 @@ impl Features {
             ("HAS_SHADING_NORMALS", self.shading_normals),
             ("HAS_MASK", self.masks),
             ("HAS_FAR_CLIP", self.far_clip),
+            ("HAS_LENS", self.lens),
+            ("HAS_ORTHOGRAPHIC", self.orthographic),
             ("HAS_FILTER", self.filter),
             ("HAS_HIDDEN_EMITTERS", self.hide_emitters),
             ("HAS_LIGHT_SAMPLING", self.light_sampling),

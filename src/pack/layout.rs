@@ -339,8 +339,17 @@ gpu_struct! {
         filter_cells: u32,
         /// Distance from the pixel's centre to the filter's ends, in pixels.
         filter_radius: f32,
+        /// Of a thin lens, 1 / distance of the plane in focus.
+        inverse_focus: f32,
+        /// Of a thin lens, its first axis with the radius as its length; of an orthographic camera, the direction of view, while
+        /// `camera_corner` and its companions are places relative to the camera's centre.
+        lens_u: Vec3,
         /// Fills the sixteen bytes.
-        unused_filter: u32,
+        unused_1: u32,
+        /// Of a thin lens, its second axis.
+        lens_v: Vec3,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
     }
 }
 
@@ -496,6 +505,7 @@ pub fn glsl() -> String {
         ("POINT_BITS", sobol::POINT_BITS),
         ("POINT_COUNT", sobol::POINT_COUNT),
         ("SOBOL_SETS", sobol::SOBOL_SETS),
+        ("LENS_SET", sobol::LENS_SET),
     ]
     .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
     .concat();

@@ -1,6 +1,6 @@
 //! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
 
-use crate::scene::{self, Geometry, MediumId, Scene, Shape};
+use crate::scene::{self, Geometry, Lens, MediumId, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
@@ -113,6 +113,12 @@ pub enum PackError {
         /// The largest value, times the scale.
         value: f64,
     },
+    /// A camera whose rays do not all begin in the same medium.
+    #[error(
+        "the boundary \"{0}\" cuts through where the rays of the camera begin, so that they would begin in different media; \
+         move the camera, or its near_clip, to one side of it"
+    )]
+    StraddlingCamera(String),
     /// Part of a scene that kernels cannot render yet.
     #[error("{what} of \"{name}\" cannot be rendered yet")]
     Unsupported {
@@ -132,6 +138,9 @@ impl Packed {
         support::check(scene)?;
         let frame = Frame::of(scene);
         let nesting = Nesting::of(scene);
+        if let Some(shape) = nesting.straddled {
+            return Err(PackError::StraddlingCamera(scene.shapes[shape].name.clone()));
+        }
         if scene.media.len() > MAX_MEDIA {
             return Err(PackError::TooManyMedia(scene.media.len()));
         }
@@ -248,6 +257,8 @@ const EMPTY_FEATURES: Features = Features {
     shading_normals: false,
     masks: false,
     far_clip: false,
+    lens: false,
+    orthographic: false,
     filter: false,
     hide_emitters: false,
     light_sampling: false,
@@ -403,11 +414,25 @@ fn pack_camera(scene: &Scene, frame: &Frame, medium: u32) -> Params {
         matrix.y_axis.truncate().normalize(),
         matrix.z_axis.truncate().normalize(),
     );
-    let half_width = (camera.fov_x.to_radians() / 2.0).tan();
-    let half_height = half_width * f64::from(film.height) / f64::from(film.width);
+    let (half_width, half_height) = match camera.lens {
+        Lens::Orthographic { half_width, half_height } => (half_width * frame.scale, half_height * frame.scale),
+        _ => {
+            let half_width = (camera.fov_x.to_radians() / 2.0).tan();
+            (half_width, half_width * f64::from(film.height) / f64::from(film.width))
+        }
+    };
+    let (lens_u, lens_v, inverse_focus) = match camera.lens {
+        Lens::Pinhole => (DVec3::ZERO, DVec3::ZERO, 0.0),
+        Lens::Thin { aperture_radius, focus_distance } => {
+            let radius = aperture_radius * frame.scale;
+            (rotation.x_axis * radius, rotation.y_axis * radius, 1.0 / (focus_distance * frame.scale))
+        }
+        Lens::Orthographic { .. } => (rotation.z_axis, DVec3::ZERO, 0.0),
+    };
+    let depth = if matches!(camera.lens, Lens::Orthographic { .. }) { 0.0 } else { 1.0 };
     let offset = camera.principal_point_offset;
     // Camera space has +x to the left, so the film's left edge is at +x.
-    let corner = DVec3::new(half_width * (1.0 - 2.0 * offset.x), half_height * (1.0 - 2.0 * offset.y), 1.0);
+    let corner = DVec3::new(half_width * (1.0 - 2.0 * offset.x), half_height * (1.0 - 2.0 * offset.y), depth);
     Params {
         camera_origin: frame.point(matrix.w_axis.truncate()),
         camera_medium: medium,
@@ -422,6 +447,9 @@ fn pack_camera(scene: &Scene, frame: &Frame, medium: u32) -> Params {
         crop_y: film.crop.y,
         crop_width: film.crop.width,
         crop_height: film.crop.height,
+        lens_u: lens_u.as_vec3(),
+        lens_v: lens_v.as_vec3(),
+        inverse_focus: inverse_focus as f32,
         ..Params::default()
     }
 }

@@ -143,6 +143,9 @@ pub struct Params {
     pub first_filter_value: u32,
     pub filter_cells: u32,
     pub filter_radius: f64,
+    pub inverse_focus: f64,
+    pub lens_u: DVec3,
+    pub lens_v: DVec3,
 }
 
 impl Tables {
@@ -290,6 +293,9 @@ impl From<&layout::Params> for Params {
             first_filter_value: from.first_filter_value,
             filter_cells: from.filter_cells,
             filter_radius: f64::from(from.filter_radius),
+            inverse_focus: f64::from(from.inverse_focus),
+            lens_u: from.lens_u.as_dvec3(),
+            lens_v: from.lens_v.as_dvec3(),
         }
     }
 }

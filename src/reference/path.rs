@@ -3,7 +3,7 @@
 
 use super::bindings::{Medium, Params, Surface, Tables};
 use super::bsdf::bsdf_has_density;
-use super::camera::camera_direction;
+use super::camera::{camera_direction, focused_direction, lens_point};
 use super::filter::sample_filter;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::channel_weights;
@@ -11,7 +11,9 @@ use super::path_flight::{end_flight, enter_medium, flight_point, free_way, near_
 use super::path_lights::{add_emission, add_medium_emission, add_sky, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
-use super::path_state::{INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_set, survived_throughput};
+use super::path_state::{
+    INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_lens, sample_set, survived_throughput,
+};
 use super::path_surface::{Place, apply_textures, opacity_at, shading_normal, surface_tangent, texture_coordinates};
 use super::path_vertex::{
     Vertex, medium_towards, offset_origin, sample_scattering, sides_agree, surface_point, to_surface_frame,
@@ -54,9 +56,17 @@ pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     let corner = DVec2::new(f64::from(column), f64::from(row));
     let place = filtered_place(tables, &mut path, corner, u.xy());
     let film = place * DVec2::new(params.inverse_width, params.inverse_height);
-    let direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
-    let depth_to_distance = direction.length();
+    let mut direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
     path.origin = params.camera_origin;
+    if tables.features.orthographic {
+        path.origin += direction;
+        direction = params.lens_u;
+    } else if tables.features.lens {
+        let point = lens_point(params.lens_u, params.lens_v, sample_lens(tables, &path).xy());
+        path.origin += point;
+        direction = focused_direction(direction, point, params.inverse_focus);
+    }
+    let depth_to_distance = direction.length();
     path.direction = direction / depth_to_distance;
     path.t_min = params.near_clip * depth_to_distance;
     path.far_end = params.far_clip * depth_to_distance;

@@ -9,7 +9,7 @@ use super::film::Film;
 use super::scene_hash::scene_hash;
 use super::session::{Outcome, Rendered};
 use crate::image::{Attribute, Image, Metadata, Window};
-use crate::scene::{self, Camera, Scene};
+use crate::scene::{self, Camera, Lens, Scene};
 
 /// The image of a render: `R G B`, `Variance.R Variance.G Variance.B` (the variance of the mean, see [`Film::variance`]),
 /// and `sampleCount`.
@@ -89,6 +89,12 @@ fn world_to_camera(camera: &Camera) -> DMat4 {
 /// the near plane to 1 on the far plane. Inverse of the camera's rays: the direction through (u, v) has x / z =
 /// 2 tan(fov/2) (u + offset − ½), and the same for y with the film's proportions.
 fn world_to_ndc(camera: &Camera, film: &scene::Film) -> DMat4 {
+    if let Lens::Orthographic { half_width, half_height } = camera.lens {
+        let depth = 1.0 / (camera.far_clip - camera.near_clip);
+        let scale = DMat4::from_scale(DVec3::new(0.5 / half_width, -0.5 / half_height, depth));
+        let center = DVec3::new(0.5, 0.5, -camera.near_clip * depth);
+        return DMat4::from_translation(center) * scale * world_to_camera(camera);
+    }
     let reciprocal_width = 0.5 / (0.5 * camera.fov_x).to_radians().tan();
     let proportion = f64::from(film.width) / f64::from(film.height);
     let center = 0.5 - camera.principal_point_offset;

@@ -85,7 +85,28 @@ impl Scene {
     }
 }
 
-/// A pinhole camera with Mitsuba's conventions: camera space looks along +z, with +y up and +x to the *left*.
+/// How rays leave a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lens {
+    /// All through one point.
+    Pinhole,
+    /// From a disk about that point, so that what is not at one distance is blurred.
+    Thin {
+        /// Radius of the disk, scene units, > 0.
+        aperture_radius: f64,
+        /// Distance of the plane in focus from the camera along the optical axis, scene units, > 0.
+        focus_distance: f64,
+    },
+    /// All in the same direction, from a rectangle. The camera's field of view has no meaning.
+    Orthographic {
+        /// Half the width of the rectangle that the whole film sees, scene units.
+        half_width: f64,
+        /// Half its height, scene units.
+        half_height: f64,
+    },
+}
+
+/// A camera with Mitsuba's conventions: camera space looks along +z, with +y up and +x to the *left*.
 #[derive(Clone, Debug)]
 pub struct Camera {
     /// Camera space to world space, a rigid motion (a uniform scale is tolerated; it does not change the picture).
@@ -98,6 +119,8 @@ pub struct Camera {
     pub far_clip: f64,
     /// Shift of the principal point, as a fraction of the film's size.
     pub principal_point_offset: DVec2,
+    /// How rays leave the camera.
+    pub lens: Lens,
     /// The scene-wide medium: what fills the space that no boundary encloses. `None` is vacuum.
     pub medium: Option<MediumId>,
 }
@@ -111,6 +134,7 @@ impl Camera {
             near_clip: 1e-2,
             far_clip: 1e4,
             principal_point_offset: DVec2::ZERO,
+            lens: Lens::Pinhole,
             medium: None,
         }
     }

@@ -369,5 +369,24 @@ fn sensors() {
     }
     let empty = "<scene version=\"3.0.0\">\n‸<sensor type=\"perspective\"/></scene>";
     refused(empty, &["neither fov nor focal_length", "50mm"]).unwrap();
-    refused("<scene version=\"3.0.0\">‸<sensor type=\"thinlens\"/></scene>", &["accepted types: perspective"]).unwrap();
+    refused("<scene version=\"3.0.0\">‸<sensor type=\"distant\"/></scene>", &["accepted types: perspective"]).unwrap();
+    let of = |plugin: &str, inside: &str| {
+        format!("<scene version=\"3.0.0\"><sensor type=\"{plugin}\">{inside}</sensor></scene>")
+    };
+    let lens = |inside: &str| of("thinlens", &format!("{fov}{inside}"));
+    for (text, parts) in [
+        (lens("‸<float name=\"aperture_radius\" value=\"0\"/>"), &["greater than 0"][..]),
+        (
+            lens("<float name=\"aperture_radius\" value=\"1\"/>‸<float name=\"focus_distance\" value=\"-1\"/>"),
+            &["greater than 0"],
+        ),
+        (
+            of("orthographic", "‸<transform name=\"to_world\"><matrix value=\"1 1 0 0 1 0 0 0 1\"/></transform>"),
+            &["shears"],
+        ),
+        (of("orthographic", "‸<transform name=\"to_world\"><scale value=\"0\"/></transform>"), &["no inverse"]),
+        (of("orthographic", "‸<float name=\"fov\" value=\"1\"/>"), &["no property \"fov\""]),
+    ] {
+        refused(&text, parts).unwrap_or_else(|failure| panic!("{failure}"));
+    }
 }

@@ -57,6 +57,12 @@ fn every_property_is_documented() {
             r#"<sensor type="perspective"><float name="fov" value="1"/>‸</sensor>"#,
             &[][..],
         ),
+        (
+            "### `<sensor type=\"thinlens\">`",
+            r#"<sensor type="thinlens"><float name="fov" value="1"/><float name="aperture_radius" value="1"/>‸</sensor>"#,
+            &[],
+        ),
+        ("### `<sensor type=\"orthographic\">`", r#"<sensor type="orthographic">‸</sensor>"#, &[]),
         ("### `<film type=\"hdrfilm\">`", film, &[]),
         ("### `<sampler type=\"independent\">`", sampler, &[]),
         ("### `<integrator type=\"volpath\">`", r#"<integrator type="volpathmis">‸</integrator>"#, &[]),
@@ -117,7 +123,10 @@ fn example(tag: &str, kind: &str) -> String {
     let string = |name: &str, value: &str| format!(r#"<string name="{name}" value="{value}"/>"#);
     let inside = match (tag, kind) {
         ("integrator", "moment" | "aov") => r#"<integrator type="path"/>"#.to_owned(),
-        ("sensor", _) => r#"<float name="fov" value="1"/>"#.to_owned(),
+        ("sensor", "perspective") => r#"<float name="fov" value="1"/>"#.to_owned(),
+        ("sensor", "thinlens") => {
+            r#"<float name="fov" value="1"/><float name="aperture_radius" value="1"/>"#.to_owned()
+        }
         ("phase", "blendphase") => r#"<float name="weight" value="0"/><phase type="hg"/><phase type="hg"/>"#.to_owned(),
         ("phase", "tabphase") => string("values", "1 1"),
         ("shape", "obj") => string("filename", "meshes/ball.obj"),
