@@ -9,7 +9,8 @@ use glam::DVec3;
 use std::path::Path;
 use tyndall::gpu::shader::Variant;
 use tyndall::pack::{PackError, Packed};
-use tyndall::scene::{Film, Geometry, Lens, Light, Medium, Phase, ReconstructionFilter, Scene, Shape, mitsuba};
+use tyndall::render::{aov, picture};
+use tyndall::scene::{Colors, Film, Geometry, Lens, Light, Medium, Phase, ReconstructionFilter, Scene, Shape, mitsuba};
 
 /// A scene of `tests/data/mitsuba` with parameters.
 fn load(name: &str, parameters: &[(&str, &str)]) -> Scene {
@@ -243,5 +244,134 @@ fn rays_that_would_begin_in_different_media_are_refused() {
     for distant in [ball(start + forward * 3.0, 1.0), cube(start - forward * 4.0, 1.0)] {
         assert_eq!(with(distant.clone(), rectangle), Ok(0));
         assert_eq!(with(distant, lens), Ok(0));
+    }
+}
+
+/// Expected values, `mitsuba channels.xml`, the mean of 4 renders of 16,384 samples.
+const CHANNELS: [(&str, [f64; 24]); 11] = [
+    (
+        "A",
+        [
+            0.3245, 0.5337, 0.6839, 0.5852, 0.1030, 0.0000, 0.5638, 1.0000, 1.0000, 0.5863, 0.4188, 0.6172, 0.4421,
+            1.0000, 1.0000, 0.6724, 0.9044, 1.0000, 0.3190, 0.8461, 0.6362, 0.3332, 0.2361, 0.4139,
+        ],
+    ),
+    (
+        "d.T",
+        [
+            1.4298, 2.4122, 3.3902, 3.5218, 1.1227, 0.0000, 2.4692, 4.4839, 4.5430, 2.9020, 1.6504, 2.3311, 1.9418,
+            4.4922, 4.6936, 3.3173, 3.3738, 3.6375, 1.4236, 3.8513, 3.0183, 1.6617, 0.9109, 1.5818,
+        ],
+    ),
+    (
+        "p.X",
+        [
+            -0.3927, -0.4229, -0.0763, 0.4110, 0.2308, 0.0000, -0.6941, -0.8404, -0.2721, 0.1323, 0.3998, 0.8160,
+            -0.5569, -0.8975, -0.3517, 0.1023, 0.7531, 1.2768, -0.4104, -0.8139, -0.2637, 0.0380, 0.2108, 0.5153,
+        ],
+    ),
+    (
+        "p.Y",
+        [
+            0.2793, 0.4498, 0.7371, 0.7548, 0.2267, 0.0000, 0.2485, 0.3913, 0.3265, 0.1759, 0.0512, 0.0572, -0.0570,
+            -0.2003, -0.2869, -0.2549, -0.2442, -0.2958, -0.2221, -0.6313, -0.5085, -0.2831, -0.1524, -0.2789,
+        ],
+    ),
+    (
+        "p.Z",
+        [
+            0.1331, 0.0901, 0.7632, 1.0000, 0.3171, 0.0000, 0.2380, 0.1965, 0.0202, -0.1116, 0.2975, 0.4866, 0.1939,
+            0.2295, -0.0856, -0.2532, 0.7375, 0.9600, 0.1449, 0.2256, -0.0314, -0.1182, 0.1770, 0.3437,
+        ],
+    ),
+    (
+        "u.U",
+        [
+            0.0292, 0.1768, 0.3108, 0.2554, 0.0760, 0.0000, 0.0439, 0.3035, 0.5577, 0.4885, 0.1481, 0.1258, 0.0271,
+            0.2705, 0.5856, 0.5894, 0.4395, 0.4902, 0.0146, 0.1974, 0.3495, 0.2848, 0.1499, 0.3172,
+        ],
+    ),
+    (
+        "u.V",
+        [
+            0.3019, 0.4917, 0.2729, 0.6110, 0.2945, 0.0000, 0.4061, 0.6957, 0.5811, 0.3716, 0.1499, 0.1655, 0.1926,
+            0.3999, 0.3565, 0.2088, 0.2204, 0.1072, 0.0484, 0.1074, 0.0638, 0.0251, 0.0701, 0.0988,
+        ],
+    ),
+    (
+        "g.X",
+        [
+            0.1622, 0.2669, 0.0714, 0.0000, 0.0000, 0.0000, 0.2819, 0.5000, 0.4320, 0.2481, -0.1841, 0.1256, 0.2211,
+            0.5000, 0.5000, 0.3362, -0.5536, 0.1280, 0.1595, 0.4230, 0.3181, 0.1666, -0.1210, 0.0310,
+        ],
+    ),
+    (
+        "s.Y",
+        [
+            0.0000, 0.0000, 0.0000, -0.0007, -0.0103, 0.0000, 0.0000, 0.0000, -0.0472, -0.0833, 0.2665, 0.4040, 0.0000,
+            0.0000, 0.0000, 0.0000, 0.0452, 0.0070, 0.0000, 0.0000, 0.0000, 0.0000, -0.1359, -0.2579,
+        ],
+    ),
+    (
+        "s.Z",
+        [
+            0.2810, 0.4622, 0.8903, 0.9993, 0.3084, 0.0000, 0.4882, 0.8660, 0.8371, 0.4689, 0.2086, 0.3995, 0.3829,
+            0.8660, 0.8660, 0.5823, 0.6262, 0.9333, 0.2762, 0.7327, 0.5509, 0.2886, 0.1376, 0.2969,
+        ],
+    ),
+    (
+        "a.G",
+        [
+            0.1298, 0.2135, 0.0571, 0.0000, 0.0000, 0.0000, 0.2255, 0.4000, 0.3456, 0.1985, 0.2082, 0.3086, 0.1768,
+            0.4000, 0.4000, 0.2690, 0.4522, 0.5000, 0.1276, 0.3384, 0.2545, 0.1333, 0.1181, 0.2070,
+        ],
+    ),
+];
+
+#[test]
+fn channels_are_those_of_mitsuba() {
+    let mut scene = load("channels.xml", &[]);
+    let packed = pack(&scene, 3);
+    let channels = aov::render(&packed, &scene.aovs, true, 4096);
+    let names: Vec<&str> = channels.iter().map(|(name, _)| name.as_str()).collect();
+    let expected = "d.T p.X p.Y p.Z u.U u.V g.X g.Y g.Z s.X s.Y s.Z a.R a.G a.B A";
+    assert_eq!(names.join(" "), expected);
+    for (name, expected) in CHANNELS {
+        let (_, found) = channels.iter().find(|(known, _)| known == name).unwrap();
+        let image: Image = found.iter().map(|value| DVec3::splat(f64::from(*value))).collect();
+        // Values up to 5 at edges between them and 0.
+        let tolerance = if name == "d.T" { 0.06 } else { 0.02 };
+        assert_eq!(farthest(&image, &expected, tolerance), None, "{name}");
+        let wrong = expected.map(|value| 0.9 * value + 0.05);
+        assert!(farthest(&image, &wrong, tolerance).is_some(), "{name}");
+    }
+    // Where the sky is seen there is something everywhere.
+    scene.integrator.hide_emitters = false;
+    let channels = aov::render(&pack(&scene, 3), &[], true, 1);
+    assert_eq!(channels, [("A".to_owned(), vec![1.0; 24])]);
+}
+
+#[test]
+fn pictures_are_written_in_the_colors_of_mitsuba() {
+    let mut image = tyndall::image::Image::new(1, 1);
+    // Pixel (2, 1) of `mitsuba channels.xml format=…`: rgb, xyz and luminance, of different renders of 16,384 samples.
+    for (name, value) in ["R", "G", "B", "sampleCount"].into_iter().zip([0.1778, 0.3315, 0.4566, 16.0]) {
+        image.push(name, vec![value]);
+    }
+    let further = || vec![("A".to_owned(), vec![0.5])];
+    let written = |colors| {
+        let image = picture::finish(image.clone(), colors, further());
+        image.channels.into_iter().map(|channel| (channel.name, channel.samples[0])).collect::<Vec<_>>()
+    };
+    for (colors, expected) in [
+        (Colors::Rgb, &[("R", 0.1778), ("G", 0.3315), ("B", 0.4566), ("A", 0.5), ("sampleCount", 16.0)][..]),
+        (Colors::Xyz, &[("X", 0.2735), ("Y", 0.3070), ("Z", 0.4753), ("A", 0.5), ("sampleCount", 16.0)]),
+        (Colors::Luminance, &[("Y", 0.3070), ("A", 0.5), ("sampleCount", 16.0)]),
+    ] {
+        let found = written(colors);
+        assert_eq!(found.len(), expected.len());
+        for ((name, value), (expected_name, expected)) in found.iter().zip(expected) {
+            assert!(name == expected_name && (value - expected).abs() < 2e-3, "{colors:?}: {name} is {value}");
+        }
     }
 }

@@ -120,8 +120,8 @@ impl RenderArgs {
     pub fn apply(&self, scene: &mut Scene) -> Result<u32, CliError> {
         if let Some((width, height)) = self.resolution {
             let whole = Film::new(width, height);
-            let Film { filter, sample_area, .. } = scene.film;
-            scene.film = Film { filter, sample_area: sample_area.and(whole.sample_area), ..whole };
+            let Film { filter, sample_area, pixel_format, .. } = scene.film;
+            scene.film = Film { filter, sample_area: sample_area.and(whole.sample_area), pixel_format, ..whole };
         }
         if let Some(crop) = self.crop {
             let film = &mut scene.film;

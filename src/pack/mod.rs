@@ -1,6 +1,6 @@
 //! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
 
-use crate::scene::{self, Geometry, Lens, MediumId, Scene, Shape};
+use crate::scene::{self, AovKind, Geometry, Lens, MediumId, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
@@ -155,7 +155,9 @@ impl Packed {
             let surface = pack_surface(shape, nesting.exteriors[index], &media, &mut textures, &mut values);
             let first = primitives.len();
             pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights);
-            if surface.flags & (SURFACE_SMOOTH | SURFACE_UVS) != 0 {
+            // Of a shape that is not packed at all there is nothing to see.
+            let described = scene.aovs.iter().any(|aov| aov.kind == AovKind::Uv) && primitives.len() > first;
+            if surface.flags & (SURFACE_SMOOTH | SURFACE_UVS) != 0 || described {
                 corners.resize(first, Corners::default());
                 corners.extend(texture::corners(shape));
                 assert_eq!(corners.len(), primitives.len(), "one entry for each primitive");

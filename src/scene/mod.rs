@@ -25,6 +25,7 @@ mod error;
 mod filter;
 pub mod mesh;
 pub mod mitsuba;
+mod output;
 mod phase;
 pub mod spectrum;
 mod texture;
@@ -33,6 +34,7 @@ pub use bitmap::Bitmap;
 pub use bsdf::{Bsdf, Distribution, Roughness};
 pub use error::SceneError;
 pub use filter::ReconstructionFilter;
+pub use output::{Aov, AovKind, Colors, PixelFormat};
 pub use phase::Phase;
 pub use texture::{Filter, Texture, Wrap};
 
@@ -55,6 +57,8 @@ pub struct Scene {
     pub media: Vec<Medium>,
     /// Light sources that are not shapes.
     pub lights: Vec<Light>,
+    /// Channels that are written beside the radiance.
+    pub aovs: Vec<Aov>,
     /// Samples a pixel that the scene asks for; the command line may ask for others.
     pub sample_count: u32,
 }
@@ -69,6 +73,7 @@ impl Scene {
             shapes: Vec::new(),
             media: Vec::new(),
             lights: Vec::new(),
+            aovs: Vec::new(),
             sample_count: 16,
         }
     }
@@ -162,6 +167,8 @@ pub struct Film {
     /// Where the samples of a filter that is wider than a pixel may lie: at the edges of this part of the film the filter is
     /// cut off, and what is left of it normalised. `None` lets samples lie beyond the edges of the film.
     pub sample_area: Option<Crop>,
+    /// How the pixels are written.
+    pub pixel_format: PixelFormat,
 }
 
 impl Film {
@@ -174,7 +181,14 @@ impl Film {
     /// A film that is rendered whole, with a box filter of one pixel.
     pub fn new(width: u32, height: u32) -> Self {
         let crop = Crop { x: 0, y: 0, width, height };
-        Film { width, height, crop, filter: ReconstructionFilter::PIXEL, sample_area: Some(crop) }
+        Film {
+            width,
+            height,
+            crop,
+            filter: ReconstructionFilter::PIXEL,
+            sample_area: Some(crop),
+            pixel_format: PixelFormat::default(),
+        }
     }
 }
 

@@ -364,6 +364,13 @@ fn sensors() {
             &["does not lie"],
         ),
         (film("‸<rfilter type=\"bx\"/>"), &["did you mean \"box\"?"]),
+        (film("<rfilter type=\"tent\">‸<float name=\"radius\" value=\"0\"/></rfilter>"), &["greater than 0"]),
+        (film("<rfilter type=\"tent\">‸<float name=\"stddev\" value=\"1\"/></rfilter>"), &["no property \"stddev\""]),
+        (film("<rfilter type=\"lanczos\">‸<integer name=\"lobes\" value=\"99\"/></rfilter>"), &["between 1 and"]),
+        (film("<rfilter type=\"mitchell\">‸<float name=\"B\" value=\"9\"/></rfilter>"), &["between -1 and 1"]),
+        (film("‸<string name=\"pixel_format\" value=\"cmyk\"/>"), &["accepted: rgb, rgba"]),
+        (film("‸<string name=\"component_format\" value=\"uint32\"/>"), &["accepted: float32, float16"]),
+        (film("‸<string name=\"file_format\" value=\"pfm\"/>"), &["accepted: openexr"]),
     ] {
         refused(&sensor(&inside), parts).unwrap_or_else(|failure| panic!("{failure}"));
     }

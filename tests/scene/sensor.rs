@@ -72,6 +72,23 @@ fn films() {
     assert_eq!(film_of(&format!("{inside}{crop}")), expected);
     let beyond = r#"<boolean name="sample_border" value="true"/>"#;
     assert_eq!(film_of(&format!("{inside}{crop}{beyond}")), Film { sample_area: None, ..expected });
+    let format = |text: &str, component: &str| {
+        let both = format!(
+            r#"<string name="pixel_format" value="{text}"/><string name="component_format" value="{component}"/>"#
+        );
+        film_of(&both).pixel_format
+    };
+    for (text, colors, alpha) in [
+        ("rgb", Colors::Rgb, false),
+        ("RGBA", Colors::Rgb, true),
+        ("xyz", Colors::Xyz, false),
+        ("xyza", Colors::Xyz, true),
+        ("luminance", Colors::Luminance, false),
+        ("luminance_alpha", Colors::Luminance, true),
+    ] {
+        assert_eq!(format(text, "float32"), PixelFormat { colors, alpha, half: false });
+        assert_eq!(format(text, "float16"), PixelFormat { colors, alpha, half: true });
+    }
     // A film beyond the limit may be rendered in parts.
     let part = r#"<integer name="width" value="60000"/><integer name="height" value="60000"/>
         <integer name="crop_width" value="100"/><integer name="crop_height" value="100"/>"#;
@@ -81,13 +98,7 @@ fn films() {
 #[test]
 fn film_warnings() {
     let fov = r#"<float name="fov" value="40"/>"#;
-    for (inside, text) in [
-        ("", "no film"),
-        (
-            r#"<film type="hdrfilm"><rfilter type="box"/><string name="pixel_format" value="luminance"/></film>"#,
-            "not as \"luminance\"",
-        ),
-    ] {
+    for (inside, text) in [("", "no film")] {
         let warnings = load(&format!("{fov}{inside}")).warnings;
         assert!(warnings.len() == 1 && warnings[0].contains(text), "{inside}: {warnings:?}");
     }

@@ -2,8 +2,9 @@
 
 use super::build::Context;
 use super::props::{Child, Props, unknown_plugin};
+use super::texture::choice;
 use super::tree::Kind;
-use crate::scene::{Crop, Film, ReconstructionFilter, SceneError};
+use crate::scene::{Colors, Crop, Film, PixelFormat, ReconstructionFilter, SceneError};
 
 pub(super) const FILM_TYPES: [&str; 1] = ["hdrfilm"];
 pub(super) const SAMPLER_TYPES: [&str; 5] = ["independent", "stratified", "multijitter", "orthogonal", "ldsampler"];
@@ -43,16 +44,8 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
         )));
     }
 
-    match props.string("pixel_format")? {
-        Some(given) if !matches!(given.value.to_ascii_lowercase().as_str(), "rgb" | "rgba") => {
-            let text = format!("the image is written as RGB, not as \"{}\"", given.value);
-            context.warnings.push(given.at.warning(text));
-        }
-        _ => {}
-    }
-    // What the file is like is up to the command line; sums are exact here without compensation.
-    props.string("component_format")?;
-    props.string("file_format")?;
+    let pixel_format = pixel_format(&props)?;
+    // Sums are exact here without compensation.
     props.ignore_boolean("compensate")?;
     let beyond = props.boolean("sample_border")?.is_some_and(|given| given.value);
     let filter = props.child(Kind::Rfilter)?;
@@ -62,7 +55,24 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
         None => ReconstructionFilter::DEFAULT,
     };
     let sample_area = if beyond { None } else { Some(crop) };
-    Ok(Film { width, height, crop, filter, sample_area })
+    Ok(Film { width, height, crop, filter, sample_area, pixel_format })
+}
+
+/// How pixels are written.
+fn pixel_format(props: &Props) -> Result<PixelFormat, SceneError> {
+    let formats = [
+        ("rgb", (Colors::Rgb, false)),
+        ("rgba", (Colors::Rgb, true)),
+        ("xyz", (Colors::Xyz, false)),
+        ("xyza", (Colors::Xyz, true)),
+        ("luminance", (Colors::Luminance, false)),
+        ("luminance_alpha", (Colors::Luminance, true)),
+    ];
+    let (colors, alpha) = choice(props, "pixel_format", &formats)?;
+    // Mitsuba's default is float16, which is a matter of the file alone: here nothing is lost unless the scene asks for it.
+    let half = choice(props, "component_format", &[("float32", false), ("float16", true)])?;
+    choice(props, "file_format", &[("openexr", ()), ("exr", ())])?;
+    Ok(PixelFormat { colors, alpha, half })
 }
 
 /// One side of the film.
