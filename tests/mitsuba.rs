@@ -375,3 +375,69 @@ fn pictures_are_written_in_the_colors_of_mitsuba() {
         }
     }
 }
+
+/// Expected values, `mitsuba surfaces.xml material=…`, the mean of 4 renders of 16,384 samples.
+const SURFACES: [(&str, [f64; 24]); 6] = [
+    (
+        "blend",
+        [
+            0.2230, 0.1798, 0.1982, 0.1721, 0.1709, 0.2023, 0.2085, 0.1544, 0.1684, 0.1830, 0.1842, 0.1862, 0.1996,
+            0.1694, 0.1392, 0.3288, 0.2248, 0.2698, 0.2803, 0.2889, 0.3000, 0.2226, 0.1645, 0.2219,
+        ],
+    ),
+    (
+        "sides",
+        [
+            0.1303, 0.1135, 0.1506, 0.1915, 0.1850, 0.1906, 0.0949, 0.0852, 0.1168, 0.2097, 0.1833, 0.1907, 0.1043,
+            0.0796, 0.1072, 0.1615, 0.0970, 0.2370, 0.2607, 0.2848, 0.3000, 0.1087, 0.0770, 0.1904,
+        ],
+    ),
+    (
+        "normals",
+        [
+            0.1246, 0.1083, 0.1498, 0.0842, 0.0786, 0.0887, 0.0894, 0.0792, 0.1163, 0.1413, 0.1111, 0.1255, 0.1070,
+            0.0671, 0.1027, 0.1575, 0.0905, 0.2365, 0.2614, 0.2841, 0.3000, 0.1030, 0.0740, 0.1904,
+        ],
+    ),
+    (
+        "bumps",
+        [
+            0.2222, 0.2139, 0.2195, 0.1883, 0.1844, 0.1877, 0.2202, 0.1842, 0.1830, 0.2067, 0.1865, 0.1874, 0.1997,
+            0.1647, 0.1783, 0.2489, 0.2025, 0.2610, 0.2791, 0.2897, 0.3000, 0.1991, 0.1516, 0.2254,
+        ],
+    ),
+    (
+        "turns",
+        [
+            0.2298, 0.2073, 0.2345, 0.1887, 0.1889, 0.2074, 0.2051, 0.1822, 0.1998, 0.2213, 0.1971, 0.1893, 0.2182,
+            0.1555, 0.1769, 0.2475, 0.1949, 0.2605, 0.2825, 0.2904, 0.3000, 0.1987, 0.1701, 0.2297,
+        ],
+    ),
+    (
+        "several",
+        [
+            0.2362, 0.2069, 0.2195, 0.2003, 0.1890, 0.1771, 0.2110, 0.1878, 0.1943, 0.2095, 0.1878, 0.2068, 0.2080,
+            0.1770, 0.1784, 0.3182, 0.2271, 0.2659, 0.2809, 0.2918, 0.3000, 0.2283, 0.2032, 0.2434,
+        ],
+    ),
+];
+
+#[test]
+fn surfaces_have_the_expected_pixels_of_mitsuba() {
+    for (name, expected) in SURFACES {
+        let packed = pack(&load("surfaces.xml", &[("material", name)]), 3);
+        assert_eq!(packed.features.blends, ["blend", "sides", "several"].contains(&name));
+        assert_eq!(packed.features.reliefs, ["normals", "bumps", "turns", "several"].contains(&name));
+        let image = on_device(&packed, 8192);
+        assert_eq!(farthest(&image, &expected, 0.012), None, "{name}");
+        let (mean, expected_mean) = (average(&image).y, expected.iter().sum::<f64>() / 24.0);
+        assert!((mean / expected_mean - 1.0).abs() < 4e-3, "{name}: a mean of {mean} instead of {expected_mean}");
+        // The planted fault: the next material.
+        let (_, other) = SURFACES[(SURFACES.iter().position(|line| line.0 == name).unwrap() + 1) % SURFACES.len()];
+        assert!(farthest(&image, &other, 0.012).is_some(), "{name} is taken for another");
+        // The reference follows the same paths.
+        let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
+        let apart = device.iter().zip(&reference).filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count();
+        assert!(apart <= 1, "{name}: {apart} pixels differ");
+    }
+}

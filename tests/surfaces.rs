@@ -107,7 +107,7 @@ fn rough_plastic_is_that_of_mitsuba() {
         };
         let found = |alpha| {
             let mut values = Vec::new();
-            let surface = material::pack(&bsdf(alpha), &mut TextureTable::default(), &mut values);
+            let surface = material::pack_chain(&bsdf(alpha), &mut TextureTable::default(), &mut values)[0];
             let towards = |cosine: f64, phi: f64| {
                 let sine = (1.0 - cosine * cosine).sqrt();
                 v(sine * phi.cos(), sine * phi.sin(), cosine)

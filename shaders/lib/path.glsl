@@ -27,6 +27,10 @@ const uint RELENTLESS_DEPTH = 256u;
 // The sets of random numbers by which light meets masks or passes them begin here, beyond those of any segment.
 const uint MASK_SETS = 0x80000000u;
 
+// The sets by which one of several BSDFs of a surface is chosen, one for each segment.
+const uint BLEND_SETS = 0xc0000000u;
+const float ONE_MINUS_EPSILON = 1.0 - 1.0 / 16777216.0;
+
 // Where a sample of the pixel with the given centre lies on the film, in pixels, and its factor by the filter.
 vec2 filtered_place(inout Path path, vec2 center, vec2 u) {
     vec2 low = params.sample_area_begin - center, high = params.sample_area_end - center;
@@ -142,6 +146,25 @@ bool passes_mask(inout Path path, Surface surface, Primitive primitive, Hit hit)
     return u >= opacity;
 }
 
+// Puts the one of the BSDFs of a surface in its place that acts at this vertex: by the side, or by chance. A choice has the share of the
+// BSDF as its probability, so the throughput stays, and all that follows at the vertex knows of one BSDF alone.
+void choose_surface(Path path, inout Surface surface, Primitive primitive, Hit hit, bool back) {
+    float u = sample_set(path, BLEND_SETS + path.segment).x;
+    [[dont_unroll]] while (surface.other != 0u) {
+        bool taken = back != ((surface.flags & SURFACE_INVERTED) != 0u);
+        if ((surface.flags & SURFACE_SIDES) == 0u) {
+            float share = share_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric);
+            taken = u < share;
+            // What is left of the number is uniform again.
+            u = taken ? min(u / share, ONE_MINUS_EPSILON) : u;
+        }
+        if (!taken) {
+            break;
+        }
+        surface = SURFACE(surface.other - 1u);
+    }
+}
+
 // Answers a ray that extends the path.
 void path_advance(inout Path path, Hit hit) {
     bool surface_hit = hit.primitive != NONE && hit.t < path.t_max;
@@ -162,7 +185,7 @@ void path_advance(inout Path path, Hit hit) {
         path.left = NONE;
         Surface none;
         vec3 point = flight_point(path, hit, end.way);
-        scatter(path, Vertex(point, path.direction, true, medium.g, medium.phase, end.weight, none, vec3(0.0), vec3(0.0), vec3(0.0)));
+        scatter(path, Vertex(point, path.direction, true, medium.g, medium.phase, end.weight, none, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0));
     } else {
         if (HAS_MEDIA) {
             // The optical depth of the way through the medium since t_min.
@@ -196,6 +219,9 @@ void path_advance(inout Path path, Hit hit) {
         }
         path.throughput = survived_throughput(path);
         bool back = dot(path.direction, normal) > 0.0;
+        if (HAS_BLENDS && surface.other != 0u) {
+            choose_surface(path, surface, primitive, hit, back);
+        }
         if (HAS_ONE_SIDED && back && (surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED)) == 0u) {
             path.alive = false;
             path.shadow = false;
@@ -215,6 +241,14 @@ void path_advance(inout Path path, Hit hit) {
                 tangent = surface_tangent(primitive, hit.primitive, point, axis);
             }
         }
+        vec3 base = axis;
+        float fade = 0.0;
+        if (HAS_RELIEFS && surface.relief_texture != 0u) {
+            fade = turn_frame(surface, primitive, hit.primitive, point, hit.barycentric, -path.direction, turned, axis, tangent);
+            if (surface.alpha == surface.alpha_v) {
+                orthonormal_frame(axis, tangent, bitangent);
+            }
+        }
         if (HAS_TEXTURES && (surface.textures_1 | (surface.textures_2 & 0xffffu)) != 0u) {
             apply_textures(surface, texture_coordinates(primitive, hit.primitive, point, hit.barycentric));
         }
@@ -222,7 +256,7 @@ void path_advance(inout Path path, Hit hit) {
         path.normal = normal;
         path.left = is_sphere(primitive) ? NONE : hit.primitive;
         vec3 incident = to_surface_frame(tangent, axis, -path.direction);
-        Vertex vertex = Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, incident, tangent, normal);
+        Vertex vertex = Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, incident, tangent, normal, base, fade);
         if (!sides_agree(vertex, incident.z, -path.direction)) {
             // The surface is seen from one side, its shading normal from the other one: nothing is reflected.
             path.alive = false;

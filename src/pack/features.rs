@@ -63,6 +63,10 @@ pub struct Features {
     pub masks: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
+    /// Surfaces with more than one BSDF.
+    pub blends: bool,
+    /// Maps of normals or heights.
+    pub reliefs: bool,
     /// A camera with a thin lens.
     pub lens: bool,
     /// A camera whose rays are parallel.
@@ -120,7 +124,9 @@ impl Features {
             conductor: bsdf(BSDF_CONDUCTOR),
             plastic: bsdf(BSDF_PLASTIC),
             rough_plastic: packed.surfaces.iter().any(|surface| surface.value_count != 0),
-            textures: packed.surfaces.iter().any(|surface| surface.textures_1 | surface.textures_2 != 0),
+            textures: packed.surfaces.iter().any(|surface| {
+                surface.textures_1 | surface.textures_2 | surface.share_texture | surface.relief_texture != 0
+            }),
             anisotropic: packed.surfaces.iter().any(|surface| surface.alpha != surface.alpha_v),
             shading_normals: flag(SURFACE_SMOOTH),
             masks: flag(SURFACE_MASK),
@@ -128,6 +134,8 @@ impl Features {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
             },
+            blends: packed.surfaces.iter().any(|surface| surface.other != 0),
+            reliefs: packed.surfaces.iter().any(|surface| surface.relief_texture != 0),
             lens: matches!(scene.camera.lens, Lens::Thin { .. }),
             orthographic: matches!(scene.camera.lens, Lens::Orthographic { .. }),
             filter: packed.params.filter_cells != 0,
@@ -173,6 +181,8 @@ impl Features {
             shading_normals: true,
             masks: true,
             far_clip: true,
+            blends: true,
+            reliefs: true,
             lens: true,
             filter: true,
             ..self
@@ -212,6 +222,8 @@ impl Features {
             ("HAS_SHADING_NORMALS", self.shading_normals),
             ("HAS_MASK", self.masks),
             ("HAS_FAR_CLIP", self.far_clip),
+            ("HAS_BLENDS", self.blends),
+            ("HAS_RELIEFS", self.reliefs),
             ("HAS_LENS", self.lens),
             ("HAS_ORTHOGRAPHIC", self.orthographic),
             ("HAS_FILTER", self.filter),

@@ -145,8 +145,16 @@ gpu_struct! {
         first_value: u32,
         /// Of rough plastic: values from there on.
         value_count: u32,
-        /// Fills the sixteen bytes.
-        unused: u32,
+        /// Index of a surface that may be in the place of this one, plus one; 0 is none.
+        other: u32,
+        /// With which probability it is, where that is no matter of sides.
+        share: f32,
+        /// Texture that stands for `share`, plus one; 0 is none.
+        share_texture: u32,
+        /// Texture of turned normals or of heights, plus one; 0 is none.
+        relief_texture: u32,
+        /// Factor of heights, canonical units.
+        relief_scale: f32,
     }
 }
 
@@ -395,8 +403,20 @@ pub const SURFACE_MASK: u32 = 32;
 pub const SURFACE_SMOOTH: u32 = 64;
 /// Bit 7: texture coordinates are needed.
 pub const SURFACE_UVS: u32 = 128;
+/// Bit 8: `other` takes the place of the surface where it is seen from behind.
+pub const SURFACE_SIDES: u32 = 256;
+/// Bit 9: where the choice of `other` is by sides, it is seen in front; where it is by a texture, 1 minus that is its share.
+pub const SURFACE_INVERTED: u32 = 512;
+/// Bit 10: `relief_texture` has heights, not normals.
+pub const SURFACE_HEIGHTS: u32 = 1024;
+/// Bit 11: turned normals that are seen from behind are turned the other way.
+pub const SURFACE_RELIEF_FLIPS: u32 = 2048;
+/// Bit 12: light fades out where it grazes the surface under turned normals.
+pub const SURFACE_RELIEF_FADES: u32 = 4096;
+/// Bit 13: seen from behind, normals are turned to the same sides as in front.
+pub const SURFACE_RELIEF_TURNS: u32 = 8192;
 /// Where the kind of BSDF begins in [`Surface::flags`].
-pub const SURFACE_KIND_SHIFT: u32 = 8;
+pub const SURFACE_KIND_SHIFT: u32 = 16;
 /// Kind of BSDF: Lambert's law.
 pub const BSDF_DIFFUSE: u32 = 0;
 /// Kind of BSDF: smooth or rough glass.
@@ -476,6 +496,12 @@ pub fn glsl() -> String {
         ("SURFACE_MASK", SURFACE_MASK),
         ("SURFACE_SMOOTH", SURFACE_SMOOTH),
         ("SURFACE_UVS", SURFACE_UVS),
+        ("SURFACE_SIDES", SURFACE_SIDES),
+        ("SURFACE_INVERTED", SURFACE_INVERTED),
+        ("SURFACE_HEIGHTS", SURFACE_HEIGHTS),
+        ("SURFACE_RELIEF_FLIPS", SURFACE_RELIEF_FLIPS),
+        ("SURFACE_RELIEF_FADES", SURFACE_RELIEF_FADES),
+        ("SURFACE_RELIEF_TURNS", SURFACE_RELIEF_TURNS),
         ("SURFACE_KIND_SHIFT", SURFACE_KIND_SHIFT),
         ("BSDF_DIFFUSE", BSDF_DIFFUSE),
         ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),

@@ -36,7 +36,7 @@ pub struct Packed {
     pub bvh: Bvh,
     /// Triangles and spheres, in the order of the hierarchy's leaves.
     pub primitives: Vec<Primitive>,
-    /// One for each shape.
+    /// One for each shape, and behind them those that may be in the place of one of these.
     pub surfaces: Vec<Surface>,
     /// Media; entry 0 is vacuum, entry `k` is `MediumId(k − 1)`.
     pub media: Vec<Medium>,
@@ -151,8 +151,16 @@ impl Packed {
         let mut lights = LightTable::default();
         let mut textures = TextureTable::default();
         let mut corners = Vec::new();
+        let mut others = Vec::new();
         for (index, shape) in scene.shapes.iter().enumerate() {
-            let surface = pack_surface(shape, nesting.exteriors[index], &media, &mut textures, &mut values);
+            let mut chain = pack_surfaces(shape, nesting.exteriors[index], &media, &frame, &mut textures, &mut values);
+            // What may be in the place of a shape's surface stands behind those of all shapes.
+            let links = chain.len() - 1;
+            for (link, surface) in chain.iter_mut().take(links).enumerate() {
+                surface.other = (scene.shapes.len() + others.len() + link) as u32 + 1;
+            }
+            others.extend(chain.drain(1..));
+            let surface = chain[0];
             let first = primitives.len();
             pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights);
             // Of a shape that is not packed at all there is nothing to see.
@@ -164,6 +172,7 @@ impl Packed {
             }
             surfaces.push(surface);
         }
+        surfaces.append(&mut others);
         let mut textures = textures.textures;
         if textures.len() > texture::MAX_TEXTURES {
             return Err(PackError::TooManyTextures(textures.len()));
@@ -259,6 +268,8 @@ const EMPTY_FEATURES: Features = Features {
     shading_normals: false,
     masks: false,
     far_clip: false,
+    blends: false,
+    reliefs: false,
     lens: false,
     orthographic: false,
     filter: false,
@@ -299,27 +310,30 @@ fn pack_media(
     Ok(media)
 }
 
-fn pack_surface(
+/// A shape's surface, and those that may be in its place, of which each may be in the place of the one before it.
+fn pack_surfaces(
     shape: &Shape,
     exterior: Option<MediumId>,
     media: &[Medium],
+    frame: &Frame,
     textures: &mut TextureTable,
     values: &mut Vec<f32>,
-) -> Surface {
+) -> Vec<Surface> {
     let (inside, outside) = match shape.boundary {
         Some(boundary) => (medium_index(boundary.interior), medium_index(exterior)),
         None => (0, 0),
     };
-    let material = material::pack(&shape.bsdf, textures, values);
+    let mut chain = material::pack_chain(&shape.bsdf, textures, values);
     let smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
     let smooth = if smooth && !material::is_null(&shape.bsdf) { SURFACE_SMOOTH } else { 0 };
     let uvs = if shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };
-    Surface {
-        flags: material.flags | smooth | uvs,
-        sigma_t_step: media[inside as usize].sigma_t - media[outside as usize].sigma_t,
-        media: inside | outside << 16,
-        ..material
+    for surface in &mut chain {
+        surface.flags |= smooth | uvs;
+        surface.sigma_t_step = media[inside as usize].sigma_t - media[outside as usize].sigma_t;
+        surface.media = inside | outside << 16;
+        surface.relief_scale *= frame.scale as f32;
     }
+    chain
 }
 
 /// Appends a shape's primitives, and its lights if it emits.

@@ -65,6 +65,11 @@ pub struct Surface {
     pub opacity: f64,
     pub first_value: u32,
     pub value_count: u32,
+    pub other: u32,
+    pub share: f64,
+    pub share_texture: u32,
+    pub relief_texture: u32,
+    pub relief_scale: f64,
 }
 
 /// See [`layout::Medium`].
@@ -211,6 +216,11 @@ impl From<&layout::Surface> for Surface {
             opacity: f64::from(from.opacity),
             first_value: from.first_value,
             value_count: from.value_count,
+            other: from.other,
+            share: f64::from(from.share),
+            share_texture: from.share_texture,
+            relief_texture: from.relief_texture,
+            relief_scale: f64::from(from.relief_scale),
         }
     }
 }

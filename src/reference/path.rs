@@ -14,14 +14,16 @@ pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
     INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_lens, sample_set, survived_throughput,
 };
-use super::path_surface::{Place, apply_textures, opacity_at, shading_normal, surface_tangent, texture_coordinates};
+use super::path_surface::{
+    Place, apply_textures, opacity_at, shading_normal, share_at, surface_tangent, texture_coordinates, turn_frame,
+};
 use super::path_vertex::{
     Vertex, medium_towards, offset_origin, sample_scattering, sides_agree, surface_point, to_surface_frame,
 };
 use super::ray::offset_distance;
 use crate::pack::layout::{
-    LIGHT_VOLUME, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SMOOTH,
-    SURFACE_TWO_SIDED,
+    LIGHT_VOLUME, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED, SURFACE_MASK, SURFACE_ORIENTED,
+    SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
 };
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
@@ -29,6 +31,8 @@ use glam::{DVec2, DVec3, Vec4Swizzles};
 const RELENTLESS_DEPTH: u32 = 256;
 /// The sets of random numbers by which light meets masks or passes them begin here.
 const MASK_SETS: u32 = 0x8000_0000;
+/// The sets by which one of several BSDFs of a surface is chosen, one for each segment.
+const BLEND_SETS: u32 = 0xc000_0000;
 
 /// Where a sample of the pixel with the given upper left corner lies on the film, in pixels, and its factor by the filter.
 fn filtered_place(tables: &Tables, path: &mut Path, corner: DVec2, u: DVec2) -> DVec2 {
@@ -150,6 +154,31 @@ fn passes_mask(tables: &Tables, path: &mut Path, surface: &Surface, place: &Plac
     u >= opacity
 }
 
+/// The one of the BSDFs of a surface that acts at this vertex: by the side, or by chance.
+fn chosen_surface<'a>(
+    tables: &'a Tables,
+    path: &Path,
+    mut surface: &'a Surface,
+    place: &Place,
+    back: bool,
+) -> &'a Surface {
+    let mut u = sample_set(tables, path, BLEND_SETS + path.segment).x;
+    while surface.other != 0 {
+        let mut taken = back != (surface.flags & SURFACE_INVERTED != 0);
+        if surface.flags & SURFACE_SIDES == 0 {
+            let share = share_at(tables, surface, place);
+            taken = u < share;
+            // What is left of the number is uniform again.
+            u = if taken { (u / share).min(1.0 - 0.5f64.powi(24)) } else { u };
+        }
+        if !taken {
+            break;
+        }
+        surface = &tables.surfaces[surface.other as usize - 1];
+    }
+    surface
+}
+
 /// Answers a ray that extends the path.
 pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
     let surface_hit = hit.primitive != NONE && hit.t < path.t_max;
@@ -168,7 +197,20 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         let Medium { g, phase, .. } = medium;
         let (tangent, normal) = (DVec3::ZERO, DVec3::ZERO);
         let albedo = end.weight;
-        let vertex = Vertex { point, axis, in_medium: true, g, phase, albedo, surface, incident, tangent, normal };
+        let vertex = Vertex {
+            point,
+            axis,
+            in_medium: true,
+            g,
+            phase,
+            albedo,
+            surface,
+            incident,
+            tangent,
+            normal,
+            base: axis,
+            fade: 0.0,
+        };
         scatter(tables, path, &vertex);
     } else {
         // The optical depth of the way through the medium since `t_min`.
@@ -197,6 +239,7 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         }
         path.throughput = survived_throughput(path);
         let back = path.direction.dot(normal) > 0.0;
+        let surface = chosen_surface(tables, path, surface, &place, back);
         if back && surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED) == 0 {
             path.alive = false;
             path.shadow = false;
@@ -209,6 +252,12 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         let (axis, normal) = if turned { (-axis, -normal) } else { (axis, normal) };
         let isotropic = surface.alpha == surface.alpha_v;
         let tangent = if isotropic { orthonormal_frame(axis).0 } else { surface_tangent(tables, &place, axis) };
+        let (base, mut axis, mut tangent, mut fade) = (axis, axis, tangent, 0.0);
+        if surface.relief_texture != 0 {
+            let frame = turn_frame(tables, surface, &place, -path.direction, turned, axis);
+            (axis, fade) = (frame.axis, frame.fade);
+            tangent = if isotropic { orthonormal_frame(axis).0 } else { frame.tangent };
+        }
         let mut surface = *surface;
         if surface.textures_1 | surface.textures_2 & 0xffff != 0 {
             apply_textures(tables, &mut surface, texture_coordinates(tables, &place));
@@ -218,7 +267,8 @@ pub fn path_advance(tables: &Tables, path: &mut Path, hit: &Hit) {
         path.left = if primitive.surface & PRIMITIVE_SPHERE == 0 { hit.primitive } else { NONE };
         let incident = to_surface_frame(tangent, axis, -path.direction);
         let (in_medium, g, phase, albedo) = (false, 0.0, 0, DVec3::ZERO);
-        let vertex = Vertex { point, axis, in_medium, g, phase, albedo, surface, incident, tangent, normal };
+        let vertex =
+            Vertex { point, axis, in_medium, g, phase, albedo, surface, incident, tangent, normal, base, fade };
         if !sides_agree(&vertex, incident.z, -path.direction) {
             // The surface is seen from one side, its shading normal from the other one: nothing is reflected.
             path.alive = false;

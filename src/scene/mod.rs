@@ -31,7 +31,7 @@ pub mod spectrum;
 mod texture;
 
 pub use bitmap::Bitmap;
-pub use bsdf::{Bsdf, Distribution, Roughness};
+pub use bsdf::{Bsdf, Distribution, Relief, ReliefMap, Roughness};
 pub use error::SceneError;
 pub use filter::ReconstructionFilter;
 pub use output::{Aov, AovKind, Colors, PixelFormat};

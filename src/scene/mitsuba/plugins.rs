@@ -21,7 +21,7 @@ pub(super) const SUPPORTED: [(Kind, &[&str]); 12] = [
 
 /// Plugins of Mitsuba 3.9 that are not supported, and what to use instead. An entry of a plugin that is supported has no
 /// effect.
-pub(super) const REFUSED: [(Kind, &str, &str); 40] = [
+pub(super) const REFUSED: [(Kind, &str, &str); 37] = [
     (Kind::Integrator, "ptracer", "use \"volpath\": light is not traced from the emitters here"),
     (Kind::Integrator, "depth", "use \"volpath\": only radiance is rendered"),
     (Kind::Integrator, "stokes", "use \"volpath\": light is not polarised here"),
@@ -40,13 +40,6 @@ pub(super) const REFUSED: [(Kind, &str, &str); 40] = [
     (Kind::Shape, "ellipsoidsmesh", "use a mesh file (obj or ply)"),
     (Kind::Shape, "sdfgrid", "convert it to a mesh file (obj or ply)"),
     (Kind::Shape, "merge", "put its shapes directly into the scene"),
-    (
-        Kind::Bsdf,
-        "blendbsdf",
-        "use the one of its two BSDFs that matters more, or \"mask\" where one of them is \"null\"",
-    ),
-    (Kind::Bsdf, "bumpmap", "use the BSDF inside, with the bumps in the mesh"),
-    (Kind::Bsdf, "normalmap", "use the BSDF inside, with the normals in the mesh"),
     (
         Kind::Bsdf,
         "principled",
