@@ -428,15 +428,15 @@ fn surfaces_have_the_expected_pixels_of_mitsuba() {
         let packed = pack(&load("surfaces.xml", &[("material", name)]), 3);
         assert_eq!(packed.features.blends, ["blend", "sides", "several"].contains(&name));
         assert_eq!(packed.features.reliefs, ["normals", "bumps", "turns", "several"].contains(&name));
-        let image = on_device(&packed, 8192);
-        assert_eq!(farthest(&image, &expected, 0.012), None, "{name}");
+        let image = on_device(&packed, 2048);
+        assert_eq!(farthest(&image, &expected, 0.016), None, "{name}");
         let (mean, expected_mean) = (average(&image).y, expected.iter().sum::<f64>() / 24.0);
-        assert!((mean / expected_mean - 1.0).abs() < 4e-3, "{name}: a mean of {mean} instead of {expected_mean}");
+        assert!((mean / expected_mean - 1.0).abs() < 6e-3, "{name}: a mean of {mean} instead of {expected_mean}");
         // The planted fault: the next material.
         let (_, other) = SURFACES[(SURFACES.iter().position(|line| line.0 == name).unwrap() + 1) % SURFACES.len()];
-        assert!(farthest(&image, &other, 0.012).is_some(), "{name} is taken for another");
+        assert!(farthest(&image, &other, 0.016).is_some(), "{name} is taken for another");
         // The reference follows the same paths.
-        let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
+        let (device, reference) = (on_device(&packed, 16), by_reference(&packed, 16));
         let apart = device.iter().zip(&reference).filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count();
         assert!(apart <= 1, "{name}: {apart} pixels differ");
     }

@@ -293,7 +293,33 @@ fn materials_and_media() {
         ("‸<bsdf type=\"roughdielectrik\" id=\"b\"/>", &["did you mean \"roughdielectric\"?"]),
         ("<bsdf type=\"twosided\">‸<bsdf type=\"null\"/></bsdf>", &["cannot hold <bsdf type=\"null\">"]),
         ("‸<bsdf type=\"twosided\"/>", &["holds 0 BSDFs"]),
-        ("‸<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>", &["holds 2 BSDFs"]),
+        (
+            "‸<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>",
+            &["holds 3 BSDFs"],
+        ),
+        ("‸<bsdf type=\"blendbsdf\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>", &["needs a weight"]),
+        (
+            "‸<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.5\"/><bsdf type=\"diffuse\"/></bsdf>",
+            &["holds 1 BSDFs; it must hold two"],
+        ),
+        (
+            "<bsdf type=\"blendbsdf\">‸<float name=\"weight\" value=\"1.5\"/><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>",
+            &["between 0 and 1"],
+        ),
+        ("‸<bsdf type=\"normalmap\"><bsdf type=\"diffuse\"/></bsdf>", &["needs <texture name=\"normalmap\""]),
+        ("‸<bsdf type=\"bumpmap\"><bsdf type=\"diffuse\"/></bsdf>", &["holds 0 textures; it must hold one"]),
+        (
+            "<bsdf type=\"bumpmap\">‸<texture type=\"checkerboard\"/><bsdf type=\"diffuse\"/></bsdf>",
+            &["must change smoothly"],
+        ),
+        (
+            "<bsdf type=\"normalmap\"><rgb name=\"normalmap\" value=\"0.5, 0.5, 1\"/>‸<bsdf type=\"null\"/></bsdf>",
+            &["cannot hold <bsdf type=\"null\">"],
+        ),
+        (
+            "<bsdf type=\"twosided\">‸<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.5\"/><bsdf type=\"dielectric\"/><bsdf type=\"diffuse\"/></bsdf></bsdf>",
+            &["lets light through"],
+        ),
         ("<bsdf type=\"diffuse\">‸<rgb name=\"reflectance\" value=\"1.5\"/></bsdf>", &["between 0 and 1"]),
         ("<bsdf type=\"null\">‸<rgb name=\"reflectance\" value=\"1\"/></bsdf>", &["accepted: nothing"]),
     ]);

@@ -98,6 +98,17 @@ fn every_property_is_documented() {
         ("### `<bsdf type=\"plastic\">`", r#"<bsdf type="plastic">‸</bsdf>"#, &[]),
         ("### `<bsdf type=\"roughplastic\">`", r#"<bsdf type="roughplastic">‸</bsdf>"#, &[]),
         ("### `<bsdf type=\"mask\">`", r#"<bsdf type="mask"><bsdf type="null"/>‸</bsdf>"#, &[]),
+        (
+            "### `<bsdf type=\"blendbsdf\">`",
+            r#"<bsdf type="blendbsdf"><float name="weight" value="0"/><bsdf type="diffuse"/><bsdf type="diffuse"/>‸</bsdf>"#,
+            &[],
+        ),
+        (
+            "### `<bsdf type=\"normalmap\">`",
+            r#"<bsdf type="normalmap"><rgb name="normalmap" value="0.5, 0.5, 1"/><bsdf type="diffuse"/>‸</bsdf>"#,
+            &[],
+        ),
+        ("### `<bsdf type=\"bumpmap\">`", &example("bsdf", "bumpmap"), &[]),
         ("### `<texture type=\"bitmap\">`", bitmap, &[]),
         ("### `<texture type=\"checkerboard\">`", r#"<texture type="checkerboard">‸</texture>"#, &[]),
         ("### `<emitter type=\"spot\">`", r#"<emitter type="spot">‸</emitter>"#, &[]),
@@ -133,6 +144,16 @@ fn example(tag: &str, kind: &str) -> String {
         ("shape", "ply" | "serialized") => string("filename", &format!("meshes/triangle.{kind}")),
         ("shape", "instance") => r#"<shape type="shapegroup"/>"#.to_owned(),
         ("bsdf", "mask" | "twosided") => r#"<bsdf type="diffuse"/>"#.to_owned(),
+        ("bsdf", "blendbsdf") => {
+            r#"<float name="weight" value="0"/><bsdf type="diffuse"/><bsdf type="diffuse"/>"#.to_owned()
+        }
+        ("bsdf", "normalmap") => r#"<rgb name="normalmap" value="0.5, 0.5, 1"/><bsdf type="diffuse"/>"#.to_owned(),
+        ("bsdf", "bumpmap") => {
+            format!(
+                r#"<texture type="bitmap">{}</texture><bsdf type="diffuse"/>"#,
+                string("filename", "textures/gray.png")
+            )
+        }
         ("texture", "bitmap") => string("filename", "textures/colors.png"),
         ("emitter", "envmap") => string("filename", "textures/sky.exr"),
         ("spectrum", "blackbody") => r#"<float name="temperature" value="1"/>"#.to_owned(),
