@@ -19,6 +19,7 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec2, DVec3};
 
 pub mod bitmap;
+mod bitmap_formats;
 mod bsdf;
 pub mod check;
 mod error;

@@ -306,6 +306,11 @@ fn materials_and_media() {
             "<bsdf type=\"blendbsdf\">‸<float name=\"weight\" value=\"1.5\"/><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>",
             &["between 0 and 1"],
         ),
+        (
+            "<bsdf type=\"blendbsdf\" id=\"a\"><float name=\"weight\" value=\"0.5\"/>‸<ref id=\"a\"/><ref id=\"a\"/></bsdf>",
+            &["is inside of itself"],
+        ),
+        ("<bsdf type=\"mask\" id=\"a\">‸<ref id=\"a\"/></bsdf>", &["is inside of itself"]),
         ("‸<bsdf type=\"normalmap\"><bsdf type=\"diffuse\"/></bsdf>", &["needs <texture name=\"normalmap\""]),
         ("‸<bsdf type=\"bumpmap\"><bsdf type=\"diffuse\"/></bsdf>", &["holds 0 textures; it must hold one"]),
         (

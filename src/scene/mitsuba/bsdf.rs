@@ -39,6 +39,17 @@ const DEFAULT_ALPHA: f64 = 0.1;
 
 /// A BSDF.
 pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Bsdf, SceneError> {
+    // By a <ref>, one could hold itself.
+    if context.open_bsdfs.contains(&child.id) {
+        return Err(child.at.error(format!("{} is inside of itself", child.object.describe())));
+    }
+    context.open_bsdfs.push(child.id);
+    let bsdf = plugin(context, child);
+    context.open_bsdfs.pop();
+    bsdf
+}
+
+fn plugin<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Bsdf, SceneError> {
     let props = context.props(child);
     let factor = |context: &mut Context<'a>, name| fraction(context, &props, name, 1.0);
     let bsdf = match child.object.plugin.as_str() {

@@ -23,6 +23,8 @@ pub(super) struct Context<'a> {
     /// Meshes as they are in their files.
     pub meshes: HashMap<MeshKey, Arc<FileMesh>>,
     medium_ids: HashMap<ObjectId, MediumId>,
+    /// BSDFs that are being read, each inside of the one before it.
+    pub open_bsdfs: Vec<ObjectId>,
 }
 
 impl<'a> Context<'a> {
@@ -48,8 +50,16 @@ impl<'a> Context<'a> {
 pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     let root = &tree.objects[0];
     let (images, meshes, medium_ids) = (HashMap::new(), HashMap::new(), HashMap::new());
-    let mut context =
-        Context { tree, warnings: Vec::new(), media: Vec::new(), aovs: Vec::new(), images, meshes, medium_ids };
+    let mut context = Context {
+        tree,
+        warnings: Vec::new(),
+        media: Vec::new(),
+        aovs: Vec::new(),
+        images,
+        meshes,
+        medium_ids,
+        open_bsdfs: Vec::new(),
+    };
     let props = Props::new(tree, root);
     refuse_doubles(root)?;
 
