@@ -405,8 +405,6 @@ fn sensors() {
     ] {
         refused(&sensor(&inside), parts).unwrap_or_else(|failure| panic!("{failure}"));
     }
-    let empty = "<scene version=\"3.0.0\">\n‸<sensor type=\"perspective\"/></scene>";
-    refused(empty, &["neither fov nor focal_length", "50mm"]).unwrap();
     refused("<scene version=\"3.0.0\">‸<sensor type=\"distant\"/></scene>", &["accepted types: perspective"]).unwrap();
     let of = |plugin: &str, inside: &str| {
         format!("<scene version=\"3.0.0\"><sensor type=\"{plugin}\">{inside}</sensor></scene>")

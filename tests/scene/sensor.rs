@@ -52,6 +52,9 @@ fn fields_of_view() {
         let got = sensor(&format!(r#"<string name="focal_length" value="{text}"/>{wide}"#)).camera.fov_x;
         assert!((got - 38.18484115600586).abs() < 1e-5, "{text}: {got}");
     }
+    // Where nothing is said, 50 mm.
+    let got = sensor(&wide).camera.fov_x;
+    assert!((got - 38.18484115600586).abs() < 1e-5, "by default: {got}");
     // The crop window does not change the field of view.
     let crop = r#"<integer name="width" value="768"/><integer name="height" value="576"/><integer name="crop_width" value="10"/>"#;
     assert!((fov("y", &film(crop)) - 51.774009704589844).abs() < 1e-5);

@@ -47,6 +47,8 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
     let pixel_format = pixel_format(&props)?;
     // Sums are exact here without compensation.
     props.ignore_boolean("compensate")?;
+    // Of Mitsuba's older versions; newer ones read over it.
+    props.ignore_boolean("banner")?;
     let beyond = props.boolean("sample_border")?.is_some_and(|given| given.value);
     let filter = props.child(Kind::Rfilter)?;
     props.finish()?;

@@ -115,12 +115,7 @@ fn fov_x(props: &Props, child: Child, film: &Film) -> Result<f64, SceneError> {
     let aspect = f64::from(film.width) / f64::from(film.height);
     let (degrees, at, axis) = match (&fov, &focal_length) {
         (Some(_), Some(second)) => return Err(second.at.error("give either fov or focal_length, not both")),
-        (None, None) => {
-            return Err(child.object.at.error(
-                "the sensor has neither fov nor focal_length; Mitsuba's default is \
-                 <string name=\"focal_length\" value=\"50mm\"/>",
-            ));
-        }
+        (None, None) => (diagonal_fov(DEFAULT_FOCAL_LENGTH), &child.object.at, "diagonal".to_owned()),
         (Some(fov), None) => {
             let name = axis.as_ref().map_or("x".to_owned(), |given| given.value.to_ascii_lowercase());
             if !FOV_AXES.contains(&name.as_str()) {
@@ -129,7 +124,7 @@ fn fov_x(props: &Props, child: Child, film: &Film) -> Result<f64, SceneError> {
             }
             (fov.value, fov.at, name)
         }
-        (None, Some(length)) => (diagonal_fov(length)?, length.at, "diagonal".to_owned()),
+        (None, Some(length)) => (diagonal_fov(millimetres(length)?), length.at, "diagonal".to_owned()),
     };
     if !(degrees > 0.0 && degrees < 180.0) {
         return Err(at.error(format!("the field of view is {degrees} degrees; it must lie between 0 and 180")));
@@ -149,14 +144,20 @@ fn fov_x(props: &Props, child: Child, film: &Film) -> Result<f64, SceneError> {
     Ok(fov_x)
 }
 
+/// The focal length in millimetres that Mitsuba takes where a sensor says nothing of its field of view.
+const DEFAULT_FOCAL_LENGTH: f64 = 50.0;
+
 /// The diagonal field of view in degrees of a lens of so many millimetres on 35 mm film (36 mm × 24 mm).
-fn diagonal_fov(length: &Given<String>) -> Result<f64, SceneError> {
+fn diagonal_fov(millimetres: f64) -> f64 {
+    2.0 * (f64::hypot(36.0, 24.0) / (2.0 * millimetres)).atan().to_degrees()
+}
+
+/// A focal length.
+fn millimetres(length: &Given<String>) -> Result<f64, SceneError> {
     let text = length.value.trim();
     let number = text.strip_suffix("mm").unwrap_or(text);
     match super::values::float(number) {
-        Ok(millimetres) if millimetres > 0.0 => {
-            Ok(2.0 * (f64::hypot(36.0, 24.0) / (2.0 * millimetres)).atan().to_degrees())
-        }
+        Ok(millimetres) if millimetres > 0.0 => Ok(millimetres),
         _ => Err(length.at.error(format!(
             "focal_length is \"{}\"; it must be a positive number of millimetres, like \"50mm\"",
             length.value
