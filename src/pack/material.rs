@@ -65,7 +65,7 @@ fn pack_part(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) ->
 }
 
 /// The surfaces of a BSDF that may have several parts: each may be in the place of the one before it. That their order can be
-/// such, [`super::support`] sees to.
+/// such, `support` sees to.
 pub fn pack_chain(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) -> Vec<Surface> {
     match bsdf {
         Bsdf::Blend { weight, first, second } => {
