@@ -61,7 +61,7 @@ void main() {
             }
             if (!path.alive && !path.shadow) {
                 if (!fresh) {
-                    SAMPLE(turn * samples_in_tile + slot) = vec4(path.radiance, 0.0);
+                    SAMPLE(turn * samples_in_tile + slot) = HAS_FILTER ? vec4(path.radiance * path.filter_weight, path.filter_weight) : vec4(path.radiance, 0.0);
                     slot = atomicAdd(next_sample, 1u);
                 }
                 fresh = false;

@@ -34,9 +34,12 @@ void main() {
         uint block = start / BLOCK_SAMPLES;
         vec3 sum = vec3(0.0), squares = vec3(0.0);
         for (uint k = start; k < min(start + BLOCK_SAMPLES, push.work.sample_count); ++k) {
-            vec3 value = samples[first + k].xyz;
+            vec4 weighted = samples[first + k];
+            vec3 value = weighted.xyz;
             sum += value;
             squares += value * value;
+            // In a negative lobe of the filter, what is positive is negative here.
+            value = weighted.w < 0.0 ? -value : value;
             if (is_nan(value.x) || is_nan(value.y) || is_nan(value.z)) {
                 atomicAdd(invalid[4u * block], 1u);
             } else if (is_infinite(value.x) || is_infinite(value.y) || is_infinite(value.z)) {

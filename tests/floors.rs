@@ -93,7 +93,7 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("path_lights", &["path_state", "path_vertex", "light", "sky"]),
     ("path_flight", &["path_state", "equiangular", "ray", "light"]),
     ("path_rays", &["path_state", "path_surface", "path_flight", "ray"]),
-    ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "path_flight", "camera", "outlook"]),
+    ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "path_flight", "camera", "filter", "outlook"]),
 ];
 const ALL_MAY_INCLUDE: &[&str] = &["constants", "layout", "features", "immediates", "sobol"];
 

@@ -303,3 +303,21 @@ fn images_that_cannot_be_compared_are_errors() {
     let empty = gray(0, 0, |_| 1.0);
     assert_eq!(compare(&empty, &empty), Err(MetricsError::Empty));
 }
+
+#[test]
+fn half_precision_keeps_eleven_digits_of_colors_and_all_of_counts() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("half.exr");
+    let mut image = Image::new(2, 1);
+    for name in ["R", "Variance.R", "sampleCount"] {
+        image.push(name, vec![0.1, 5001.0]);
+    }
+    image.metadata.half = true;
+    exr::write(&path, &image).unwrap();
+    let read = exr::read(&path).unwrap();
+    // 0.1 in binary with eleven digits is 1638/2^14; 5001 has 13 digits.
+    assert_eq!(read.channel("R").unwrap(), [1638.0 / 16384.0, 5000.0]);
+    for exact in ["Variance.R", "sampleCount"] {
+        assert_eq!(read.channel(exact).unwrap(), [0.1, 5001.0]);
+    }
+}

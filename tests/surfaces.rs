@@ -107,7 +107,7 @@ fn rough_plastic_is_that_of_mitsuba() {
         };
         let found = |alpha| {
             let mut values = Vec::new();
-            let surface = material::pack(&bsdf(alpha), &mut TextureTable::default(), &mut values);
+            let surface = material::pack_chain(&bsdf(alpha), &mut TextureTable::default(), &mut values)[0];
             let towards = |cosine: f64, phi: f64| {
                 let sine = (1.0 - cosine * cosine).sqrt();
                 v(sine * phi.cos(), sine * phi.sin(), cosine)
@@ -220,4 +220,29 @@ fn shading_normals_reflect_as_a_sphere_and_leak_nothing() {
     scene.lights.push(Light::Point { position: v(0.0, 3.0, 0.0), intensity: DVec3::splat(30.0) });
     scene.integrator.max_depth = Some(20);
     assert_eq!(images::average(&images::on_device(&scenes::pack(&scene, 4), 64)), DVec3::ZERO, "light leaks in");
+}
+
+#[test]
+fn gradients_of_textures_are_those_of_their_values() {
+    use tyndall::reference::texture::texture_gradient;
+    let mut random = Random(5);
+    for (wrap, turn) in [(Wrap::Repeat, 0.0), (Wrap::Mirror, 0.7), (Wrap::Clamp, -2.0)] {
+        let to_uv = glam::DAffine2::from_scale_angle_translation(DVec2::new(1.5, 2.5), turn, DVec2::new(0.3, -0.2));
+        let texture = Texture::Bitmap { bitmap: scenes::image(), filter: Filter::Bilinear, wrap, to_uv };
+        let (mut table, mut values) = (TextureTable::default(), Vec::new());
+        table.add(&texture, &mut values);
+        let entry = bindings::Texture::from(&table.textures[0]);
+        let value = |uv: DVec2| eval_texture(&entry, &values, uv).x;
+        let (mut good, mut flat) = (0, 0);
+        for _ in 0..500 {
+            let uv = DVec2::new(random.unit(), random.unit()) * 3.0 - 1.0;
+            let step = 1e-6;
+            let slope = |axis: DVec2| (value(uv + axis * step) - value(uv - axis * step)) / (2.0 * step);
+            let (got, expected) = (texture_gradient(&entry, &values, uv), DVec2::new(slope(DVec2::X), slope(DVec2::Y)));
+            // Where two cells meet there are two slopes.
+            good += u32::from((got - expected).length() < 1e-4 * (1.0 + expected.length()));
+            flat += u32::from(got == DVec2::ZERO);
+        }
+        assert!(good >= 497 && (flat < 100 || wrap == Wrap::Clamp), "{wrap:?}: {good} agree, {flat} are flat");
+    }
 }

@@ -10,13 +10,16 @@ use common::tolerances::comparison;
 use common::units::{run, vec4, widen};
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::PI;
+use tyndall::pack::filter;
 use tyndall::pack::layout::{
     self, INFINITE_DISTANCE, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_SPOT,
     LIGHT_TRIANGLE, Light,
 };
 use tyndall::pack::lights::alias_table;
 use tyndall::pack::sobol;
+use tyndall::reference;
 use tyndall::reference::{bindings, camera, film, light, math, medium, phase, rng, sampler, warp};
+use tyndall::scene::ReconstructionFilter;
 
 /// The numbers k/2²⁴ that matter most: both ends, powers of two, and some in between.
 fn units_in_question() -> Vec<f64> {
@@ -422,21 +425,25 @@ fn cameras() {
     for _ in 0..1000 {
         let [corner, right, down] = [0; 3].map(|_| narrow(random.in_cube()).map(f64::from));
         inputs.extend([corner, right, down].map(|vector| vec4(&vector)));
-        inputs.push(vec4(&[random.unit(), random.unit()]));
+        inputs.push(vec4(&[random.unit(), random.unit(), random.unit(), random.unit()]));
     }
     let count = inputs.len() / 4;
-    let outputs: Vec<[f32; 4]> = run("camera", &inputs, &[], count, count);
+    let outputs: Vec<[f32; 4]> = run("camera", &inputs, &[], count, 3 * count);
     let mut direction = comparison("camera_direction");
-    for (input, output) in inputs.chunks(4).zip(&outputs) {
+    let (mut point, mut focused) = (comparison("lens_point"), comparison("focused_direction"));
+    for (input, output) in inputs.chunks(4).zip(outputs.chunks(3)) {
         let [corner, right, down] = [0, 1, 2].map(|k| widen(&input[k][..3]));
         let film = DVec2::new(f64::from(input[3][0]), f64::from(input[3][1]));
         let expected = camera::camera_direction(corner, right, down, film);
         // Relative to the vectors that are added, which may cancel.
         if expected.length() > 0.5 {
-            direction.vector(format!("{input:?}"), &output[..3], expected);
+            direction.vector(format!("{input:?}"), &output[0][..3], expected);
         }
+        let place = camera::lens_point(right, down, DVec2::new(f64::from(input[3][2]), f64::from(input[3][3])));
+        point.vector(format!("{input:?}"), &output[1][..3], place);
+        focused.vector(format!("{input:?}"), &output[2][..3], camera::focused_direction(expected, place, 0.5));
     }
-    direction.finish();
+    [direction, point, focused].into_iter().for_each(Comparison::finish);
 }
 
 #[test]
@@ -453,4 +460,64 @@ fn tiles_cover_the_crop_window_once() {
     }
     let inside = seen.iter().filter(|[x, y, ..]| *x < width && *y < height).count();
     assert_eq!(inside, (width * height) as usize);
+}
+
+#[test]
+fn reconstruction_filters() {
+    let (mut ranks, mut weights, mut densities) =
+        (comparison("sample_filter rank"), comparison("sample_filter weight"), comparison("filter_pdf"));
+    for kind in [
+        ReconstructionFilter::Box { radius: 1.25 },
+        ReconstructionFilter::Tent { radius: 1.0 },
+        ReconstructionFilter::DEFAULT,
+        ReconstructionFilter::CATMULL_ROM,
+        ReconstructionFilter::Lanczos { lobes: 3.0 },
+    ] {
+        let table = filter::table(&kind);
+        let (cells, radius) = (table.len() as u32 / 2 - 1, f64::from(kind.radius() as f32));
+        let mut inputs = Vec::new();
+        for (k, u) in units_in_question().into_iter().enumerate() {
+            // The middle of a film, its corners, and a film of one pixel.
+            let bounds = [[-1e5, 1e5], [-0.5, 1e5], [-1e5, 0.5], [-0.5, 0.5], [-1.5, 2.5]][k % 5];
+            inputs.push(vec4(&[u, bounds[0], bounds[1]]));
+            inputs.push(vec4(&[f64::from(cells), radius, radius * (2.2 * u - 1.1)]));
+        }
+        let outputs: Vec<[f32; 4]> =
+            run("filter", &inputs, &[bytemuck::cast_slice(&table)], inputs.len() / 2, inputs.len() / 2);
+        let mut last = [f64::NEG_INFINITY; 5];
+        let mut sorted: Vec<(usize, f64, f64)> = Vec::new();
+        for (k, (input, output)) in inputs.chunks(2).zip(&outputs).enumerate() {
+            let [u, low, high, _] = input[0].map(f64::from);
+            let bounds = DVec2::new(low, high);
+            let expected = reference::filter::sample_filter(&table, cells, radius, bounds, u);
+            let offset = f64::from(output[0]);
+            let case = format!("{kind:?}, u {u}, bounds {bounds}");
+            assert!((low..=high).contains(&offset) && offset.abs() <= radius * (1.0 + 1e-7), "{case}: {offset}");
+            // Where the filter is nearly 0 its places are uncertain: what counts is how much of it lies to their left.
+            let rank = |x: f64| {
+                let place = |x: f64| ((x + radius) * f64::from(cells) / (2.0 * radius)).clamp(0.0, f64::from(cells));
+                reference::filter::filter_integral(&table, cells, place(x))
+            };
+            let share = (rank(offset) - rank(low)) / (rank(high) - rank(low));
+            ranks.scalar(&case, share as f32, u);
+            // At the edge of a cell with another sign either may be taken.
+            if f64::from(output[1]).signum() == expected.weight.signum() {
+                weights.scalar(&case, output[1], expected.weight);
+            }
+            let asked = f64::from(input[1][2]);
+            let edge = ((asked + radius) * f64::from(cells) / (2.0 * radius)).fract();
+            if (1e-3..0.999).contains(&edge) && (asked - low).abs() > 1e-3 && (asked - high).abs() > 1e-3 {
+                let expected = reference::filter::filter_pdf(&table, cells, radius, bounds, asked);
+                densities.scalar(format!("{case} at {asked}"), output[2], expected);
+            }
+            sorted.push((k % 5, u, offset));
+        }
+        // Larger numbers lie farther to the right, so that stratified ones are stratified places.
+        sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
+        for (bounds, u, offset) in sorted {
+            assert!(offset >= last[bounds], "{kind:?}: at u = {u}, {offset} lies to the left of {}", last[bounds]);
+            last[bounds] = offset;
+        }
+    }
+    [ranks, weights, densities].into_iter().for_each(Comparison::finish);
 }

@@ -18,6 +18,7 @@
 #include "lib/path_rays.glsl"
 #include "lib/path_flight.glsl"
 #include "lib/camera.glsl"
+#include "lib/filter.glsl"
 #include "lib/outlook.glsl"
 
 // Depth at which roulette begins to end paths that lose nothing, so that a closed scene without absorption ends. A path gets
@@ -28,13 +29,39 @@ const uint RELENTLESS_DEPTH = 256u;
 // The sets of random numbers by which light meets masks or passes them begin here, beyond those of any segment.
 const uint MASK_SETS = 0x80000000u;
 
+// The sets by which one of several BSDFs of a surface is chosen, one for each segment.
+const uint BLEND_SETS = 0xc0000000u;
+const float ONE_MINUS_EPSILON = 1.0 - 1.0 / 16777216.0;
+
+// Where a sample of the pixel with the given centre lies on the film, in pixels, and its factor by the filter.
+vec2 filtered_place(inout Path path, vec2 center, vec2 u) {
+    vec2 low = params.sample_area_begin - center, high = params.sample_area_end - center;
+    FilterSample x = sample_filter(params.first_filter_value, params.filter_cells, params.filter_radius, vec2(low.x, high.x), u.x);
+    FilterSample y = sample_filter(params.first_filter_value, params.filter_cells, params.filter_radius, vec2(low.y, high.y), u.y);
+    path.filter_weight = x.weight * y.weight;
+    return center + vec2(x.offset, y.offset);
+}
+
 void path_start(inout Path path) {
     vec4 u = sample_set(path, 0u);
     uint row = path.pixel / params.film_width, column = path.pixel - row * params.film_width;
-    vec2 film = (vec2(column, row) + u.xy) * vec2(params.inverse_width, params.inverse_height);
+    vec2 place = vec2(column, row) + u.xy;
+    path.filter_weight = 1.0;
+    if (HAS_FILTER && params.filter_cells > 0u) {
+        place = filtered_place(path, vec2(column, row) + 0.5, u.xy);
+    }
+    vec2 film = place * vec2(params.inverse_width, params.inverse_height);
     vec3 direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
-    float depth_to_distance = length(direction);
     path.origin = params.camera_origin;
+    if (HAS_ORTHOGRAPHIC) {
+        path.origin += direction;
+        direction = params.lens_u;
+    } else if (HAS_LENS) {
+        vec3 point = lens_point(params.lens_u, params.lens_v, sample_lens(path).xy);
+        path.origin += point;
+        direction = focused_direction(direction, point, params.inverse_focus);
+    }
+    float depth_to_distance = length(direction);
     path.direction = direction / depth_to_distance;
     path.t_min = params.near_clip * depth_to_distance;
     path.far_end = HAS_FAR_CLIP ? params.far_clip * depth_to_distance : INFINITE_DISTANCE;
@@ -143,6 +170,25 @@ bool passes_mask(inout Path path, Surface surface, Primitive primitive, Hit hit)
     return u >= opacity;
 }
 
+// Puts the one of the BSDFs of a surface in its place that acts at this vertex: by the side, or by chance. A choice has the share of the
+// BSDF as its probability, so the throughput stays, and all that follows at the vertex knows of one BSDF alone.
+void choose_surface(Path path, inout Surface surface, Primitive primitive, Hit hit, bool back) {
+    float u = sample_set(path, BLEND_SETS + path.segment).x;
+    [[dont_unroll]] while (surface.other != 0u) {
+        bool taken = back != ((surface.flags & SURFACE_INVERTED) != 0u);
+        if ((surface.flags & SURFACE_SIDES) == 0u) {
+            float share = share_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric);
+            taken = u < share;
+            // What is left of the number is uniform again.
+            u = taken ? min(u / share, ONE_MINUS_EPSILON) : u;
+        }
+        if (!taken) {
+            break;
+        }
+        surface = SURFACE(surface.other - 1u);
+    }
+}
+
 // What a ray that extends the path meets. Returns whether it is a vertex that scatters; else the path ends, or goes on along the
 // same ray. (Kernels compute both sides of a branch for some paths or others, so nothing stands here twice.)
 bool meet(inout Path path, Hit hit, out Vertex vertex) {
@@ -168,6 +214,8 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
     }
     vertex.in_medium = end.scatters;
     vertex.axis = path.direction;
+    vertex.base = path.direction;
+    vertex.fade = 0.0;
     vertex.normal = path.direction;
     path.shadow = false;
     if (end.scatters) {
@@ -211,6 +259,9 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
     }
     path.throughput = survived_throughput(path);
     bool back = dot(path.direction, normal) > 0.0;
+    if (HAS_BLENDS && surface.other != 0u) {
+        choose_surface(path, surface, primitive, hit, back);
+    }
     // Where a surface is seen from one side, but its shading normal from the other one, nothing is reflected.
     bool seen = !(HAS_ONE_SIDED && back && (surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED)) == 0u);
     bool turned = back && !(HAS_DIELECTRIC && (surface.flags & SURFACE_ORIENTED) != 0u);
@@ -227,6 +278,14 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
             tangent = surface_tangent(primitive, hit.primitive, point, axis);
         }
     }
+    vec3 base = axis;
+    float fade = 0.0;
+    if (HAS_RELIEFS && surface.relief_texture != 0u) {
+        fade = turn_frame(surface, primitive, hit.primitive, point, hit.barycentric, -path.direction, turned, axis, tangent);
+        if (surface.alpha == surface.alpha_v) {
+            orthonormal_frame(axis, tangent, bitangent);
+        }
+    }
     if (HAS_TEXTURES && (surface.textures_1 | (surface.textures_2 & 0xffffu)) != 0u) {
         apply_textures(surface, texture_coordinates(primitive, hit.primitive, point, hit.barycentric));
     }
@@ -234,7 +293,7 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
     path.normal = normal;
     path.left = is_sphere(primitive) ? NONE : hit.primitive;
     vec3 incident = to_surface_frame(tangent, axis, -path.direction);
-    vertex = Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, incident, tangent, normal);
+    vertex = Vertex(point, axis, false, 0.0, 0u, vec3(0.0), surface, incident, tangent, normal, base, fade);
     path.alive = seen && sides_agree(vertex, incident.z, -path.direction);
     return path.alive;
 }

@@ -13,6 +13,7 @@ const uint EMISSION_SETS = 0x80000000u;
 struct Path {
     uint pixel;             // of the whole film
     uint sample_index;
+    float filter_weight;    // where the filter is wide: factor of the radiance; negative in its negative lobes
     // The ray that is asked for.
     vec3 origin;
     vec3 direction;
@@ -79,6 +80,12 @@ vec4 sample_set(Path path, uint set) {
         point = POINT(point_index(set, path.sample_index, key));
     }
     return shifted_point(point, key);
+}
+
+// The numbers for a camera's lens.
+vec4 sample_lens(Path path) {
+    uvec4 key = lens_key(params.seed, path.pixel, path.sample_index);
+    return shifted_point(POINT(point_index(LENS_SET, path.sample_index, key)), key);
 }
 
 uint valid_medium(uint medium) {

@@ -68,3 +68,71 @@ vec3 surface_tangent(Primitive primitive, uint index, vec3 point, vec3 axis) {
     orthonormal_frame(axis, tangent, bitangent);
     return squared > 0.0 ? along * inversesqrt(squared) : tangent;
 }
+
+// With which probability the other surface is in the place of a surface.
+float share_at(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric) {
+    if (!HAS_TEXTURES || surface.share_texture == 0u) {
+        return surface.share;
+    }
+    float share = clamp(eval_texture(TEXTURE(surface.share_texture - 1u), texture_coordinates(primitive, index, point, barycentric)).x, 0.0, 1.0);
+    return (surface.flags & SURFACE_INVERTED) != 0u ? 1.0 - share : share;
+}
+
+// The derivatives of the place on a primitive by the texture coordinates; false where these are degenerate.
+bool place_derivatives(Primitive primitive, uint index, vec3 point, out vec3 dp_du, out vec3 dp_dv) {
+    if (is_sphere(primitive)) {
+        vec3 outwards = point - primitive.a;
+        float flat_length = length(outwards.xy);
+        dp_du = 2.0 * PI * vec3(-outwards.y, outwards.x, 0.0);
+        dp_dv = PI * vec3(outwards.xy * (outwards.z / flat_length), -flat_length);
+        return flat_length > 0.0;
+    }
+    Corners corners = CORNERS(index);
+    vec2 u = vec2(corners.u_b, corners.u_c) - corners.u_a, v = corners.v.yz - corners.v.x;
+    vec3 edge_1 = primitive.b - primitive.a, edge_2 = primitive.c - primitive.a;
+    float determinant = u.x * v.y - u.y * v.x;
+    dp_du = (edge_1 * v.y - edge_2 * v.x) / determinant;
+    dp_dv = (edge_2 * u.x - edge_1 * u.y) / determinant;
+    return determinant != 0.0;
+}
+
+// The normal of a height field over a surface with the normal n, in (s, t, n); not normalised. The change of n itself is left out.
+vec3 height_normal(Surface surface, Primitive primitive, uint index, vec3 point, vec2 uv, vec3 s, vec3 t, vec3 n) {
+    vec3 dp_du, dp_dv;
+    if (!place_derivatives(primitive, index, point, dp_du, dp_dv)) {
+        return vec3(0.0, 0.0, 1.0);
+    }
+    vec2 slope = texture_gradient(TEXTURE(surface.relief_texture - 1u), uv) * surface.relief_scale;
+    vec3 found = cross(dp_du + n * (slope.x - dot(n, dp_du)), dp_dv + n * (slope.y - dot(n, dp_dv)));
+    found = dot(found, n) < 0.0 ? -found : found;
+    return vec3(dot(s, found), dot(t, found), dot(n, found));
+}
+
+// Turns the frame of a BSDF by a map of normals or heights. `towards` is where the path comes from; `turned` says that the axis is on the
+// back of the surface. Returns the squared roughness by which light fades where it grazes the surface, 0 if it does not.
+float turn_frame(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric, vec3 towards, bool turned, inout vec3 axis, inout vec3 tangent) {
+    vec2 uv = texture_coordinates(primitive, index, point, barycentric);
+    vec3 s = surface_tangent(primitive, index, point, axis), front = turned ? -axis : axis, t = cross(front, s), n;
+    if ((surface.flags & SURFACE_HEIGHTS) != 0u) {
+        n = height_normal(surface, primitive, index, point, uv, s, t, front);
+    } else {
+        n = 2.0 * eval_texture(TEXTURE(surface.relief_texture - 1u), uv) - 1.0;
+    }
+    n.xy = turned && (surface.flags & SURFACE_RELIEF_TURNS) != 0u ? -n.xy : n.xy;
+    vec3 local = vec3(dot(s, towards), dot(t, towards), dot(axis, towards));
+    n.xy = (surface.flags & SURFACE_RELIEF_FLIPS) != 0u && local.z * dot(local, n) <= 0.0 ? -n.xy : n.xy;
+    float squared = dot(n, n);
+    n = squared > 0.0 ? n * inversesqrt(squared) : vec3(0.0, 0.0, 1.0);
+    vec3 along = vec3(1.0, 0.0, 0.0) - n * n.x;
+    along = dot(along, along) > 0.0 ? normalize(along) : vec3(0.0, 1.0, 0.0);
+    tangent = normalize(s * along.x + t * along.y + axis * along.z);
+    axis = normalize(s * n.x + t * n.y + axis * n.z);
+    bool fades = (surface.flags & SURFACE_RELIEF_FADES) != 0u;
+    return fades ? min(0.125 * dot(n.xy, n.xy) / max(n.z * n.z, 1e-12), 1.0) : 0.0;
+}
+
+// What is left of light in a direction whose cosine to the interpolated normal is given (Conty Estevez, Lecocq and Stein 2019).
+float relief_fading(float squared_roughness, float cosine) {
+    float c2 = max(cosine * cosine, 1e-12);
+    return 2.0 / (1.0 + sqrt(1.0 + squared_roughness * max(1.0 - c2, 0.0) / c2));
+}

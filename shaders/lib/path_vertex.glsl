@@ -18,6 +18,8 @@ struct Vertex {
     vec3 incident;  // on a surface: towards where the path comes from, in the local frame
     vec3 tangent;   // on a surface, where roughness depends on the direction: x of the local frame
     vec3 normal;    // on a surface: the geometric normal, on the side of `axis`
+    vec3 base;      // where normals are turned by maps: the normal before that
+    float fade;     // there: squared roughness by which light fades where it grazes the surface, or 0
 };
 
 // The components of a direction in the local frame of a surface, and back.
@@ -38,7 +40,7 @@ vec3 from_surface_frame(vec3 tangent, vec3 axis, vec3 local) {
 // Whether a direction lies on the same side of a surface and of its shading normal. One that does not would leak through the
 // surface, so the BSDF knows no such directions.
 bool sides_agree(Vertex vertex, float local_z, vec3 direction) {
-    return !HAS_SHADING_NORMALS || (local_z > 0.0) == (dot(vertex.normal, direction) > 0.0);
+    return !(HAS_SHADING_NORMALS || HAS_RELIEFS) || (local_z > 0.0) == (dot(vertex.normal, direction) > 0.0);
 }
 
 // Scattering function times cosine, and the density with which directions are sampled.
@@ -55,7 +57,11 @@ BsdfValue eval_scattering(Vertex vertex, vec3 direction) {
     if (!sides_agree(vertex, local.z, direction)) {
         return BsdfValue(vec3(0.0), 0.0);
     }
-    return eval_bsdf(vertex.surface, vertex.incident, local);
+    BsdfValue found = eval_bsdf(vertex.surface, vertex.incident, local);
+    if (HAS_RELIEFS && vertex.fade > 0.0) {
+        found.value *= relief_fading(vertex.fade, dot(vertex.base, direction));
+    }
+    return found;
 }
 
 BsdfSample sample_scattering(Vertex vertex, vec2 u, float lobe) {
@@ -78,6 +84,9 @@ BsdfSample sample_scattering(Vertex vertex, vec2 u, float lobe) {
     if (!sides_agree(vertex, side, found.direction)) {
         found.weight = vec3(0.0);
         found.pdf = 0.0;
+    }
+    if (HAS_RELIEFS && vertex.fade > 0.0) {
+        found.weight *= relief_fading(vertex.fade, dot(vertex.base, found.direction));
     }
     return found;
 }

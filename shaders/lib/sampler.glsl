@@ -4,6 +4,7 @@
 // The dimensions are named, so that a feature that a scene lacks never shifts the numbers of another:
 //   set 0          pixel x, pixel y, free flight, channel        of the camera's segment
 //   set 2 s        roulette, lobe or component, free flight, channel    of segment s > 0 (the second: of the vertex before)
+//   LENS_SET             lens x, lens y               of the camera's ray, from a key of its own
 //   set 2^31 + s   point of emission                             along segment s, in chromatic media
 //   set 2 s + 1    light x, light y, scatter x, scatter y        of the vertex at the end of segment s
 #include "lib/rng.glsl"
@@ -13,7 +14,12 @@ uvec4 set_key(uint seed, uint pixel, uint set, uint index) {
     return pcg4d(uvec4(pixel, set, seed, set < SOBOL_SETS ? index >> POINT_BITS : index));
 }
 
-// Which of the table's points is next, for a set below SOBOL_SETS. The lowest bits of the key do not reach the numbers.
+// The random words of the set for a camera's lens: those of set 0 with other words for the seed.
+uvec4 lens_key(uint seed, uint pixel, uint index) {
+    return set_key(seed ^ 0x6c656e73u, pixel, 0u, index);
+}
+
+// Which of the table's points is next, for a set below SOBOL_SETS, or LENS_SET. The lowest bits of the key do not reach the numbers.
 uint point_index(uint set, uint index, uvec4 key) {
     return set * POINT_COUNT + ((index ^ (key.x & 0xffu) ^ (key.y & 0xffu) << 4u) & (POINT_COUNT - 1u));
 }

@@ -46,3 +46,19 @@ vec3 eval_texture(Texture texture, vec2 uv) {
     vec3 lower = mix(texture_pixel(texture, x, y + 1), texture_pixel(texture, x + 1, y + 1), share.x);
     return mix(upper, lower, share.y);
 }
+
+// The gradient of the first channel of an image with bilinear filter, with respect to (u, v); 0 for what is no image.
+vec2 texture_gradient(Texture texture, vec2 uv) {
+    if (texture.kind != TEXTURE_BITMAP) {
+        return vec2(0.0);
+    }
+    vec2 place = vec2(dot(texture.row_u, vec3(uv, 1.0)), dot(texture.row_v, vec3(uv, 1.0)));
+    place = vec2(wrapped_coordinate(place.x, texture.flags), wrapped_coordinate(place.y, texture.flags));
+    place *= vec2(texture.width, texture.height);
+    vec2 low = floor(place - 0.5), share = place - 0.5 - low;
+    int x = int(low.x), y = int(low.y);
+    float f00 = texture_pixel(texture, x, y).x, f10 = texture_pixel(texture, x + 1, y).x;
+    float f01 = texture_pixel(texture, x, y + 1).x, f11 = texture_pixel(texture, x + 1, y + 1).x;
+    vec2 slope = vec2(mix(f10 - f00, f11 - f01, share.y), mix(f01 - f00, f11 - f10, share.x)) * vec2(texture.width, texture.height);
+    return texture.row_u.xy * slope.x + texture.row_v.xy * slope.y;
+}

@@ -122,7 +122,9 @@ impl RenderArgs {
     /// Changes the film of `scene` as asked, and returns the number of samples.
     pub fn apply(&self, scene: &mut Scene) -> Result<u32, CliError> {
         if let Some((width, height)) = self.resolution {
-            scene.film = Film::new(width, height);
+            let whole = Film::new(width, height);
+            let Film { filter, sample_area, pixel_format, .. } = scene.film;
+            scene.film = Film { filter, sample_area: sample_area.and(whole.sample_area), pixel_format, ..whole };
         }
         if let Some(crop) = self.crop {
             let film = &mut scene.film;
@@ -133,6 +135,8 @@ impl RenderArgs {
                 return Err(CliError::Usage(message));
             }
             film.crop = crop;
+            // A part of the picture is as it would be in the whole.
+            film.sample_area = film.sample_area.and(Film::new(film.width, film.height).sample_area);
         }
         let spp = self.spp.unwrap_or(scene.sample_count);
         if !(1..=i32::MAX as u32).contains(&spp) {
@@ -243,7 +247,7 @@ mod tests {
     #[test]
     fn the_film_is_changed_as_asked() {
         let crop = |x, y, width, height| Crop { x, y, width, height };
-        let film = |width, height, crop| Film { width, height, crop };
+        let film = |width, height, crop| Film { crop, ..Film::new(width, height) };
         assert_eq!(apply(&[]).unwrap(), (film(100, 50, crop(10, 10, 20, 5)), 7));
         assert_eq!(apply(&["--spp", "3"]).unwrap().1, 3);
         assert_eq!(apply(&["--resolution", "20x10"]).unwrap().0, Film::new(20, 10));

@@ -44,8 +44,8 @@ pub fn open(
 }
 
 /// The tables of a scene, as [`open`] would upload them.
-pub fn pack(scene: &Scene) -> Result<Packed, CliError> {
-    Packed::new(scene, 0).map_err(|error| CliError::Scene(error.to_string()))
+pub fn pack(scene: &Scene, seed: u32) -> Result<Packed, CliError> {
+    Packed::new(scene, seed).map_err(|error| CliError::Scene(error.to_string()))
 }
 
 /// Bytes on the device and on the host that rendering takes beside the tables.

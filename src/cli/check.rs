@@ -12,7 +12,7 @@ use super::{backend, report};
 /// doubtful is not, unless it was asked for.
 pub fn run(args: &CheckArgs) -> Result<ExitCode, CliError> {
     let loaded = backend::load(&args.scene, &args.overrides)?;
-    let packed = backend::pack(&loaded.scene)?;
+    let packed = backend::pack(&loaded.scene, 0)?;
     let warnings = [loaded.warnings, packed.warnings.clone()].concat();
     let doubts = check::doubts(&loaded.scene);
     let scene = args.scene.display().to_string();

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use tyndall::image::{self, exr, preview};
 use tyndall::render::session::{self, Options, Outcome, Rendered};
-use tyndall::render::{Backend, picture};
+use tyndall::render::{Backend, aov, picture};
 use tyndall::scene::Scene;
 
 use super::args::RenderArgs;
@@ -74,10 +74,11 @@ fn render(
     let rendered = rendered?;
 
     let image = picture::assemble(scene, &rendered, &device, args.seed);
-    exr::write(output, &image)?;
     if let Some(path) = &args.preview {
         preview::write_png(path, &image)?;
     }
+    let further = further_channels(args, scene, rendered.film.samples())?;
+    exr::write(output, &picture::finish(image, scene.film.pixel_format.colors, further))?;
 
     if !args.quiet {
         super::say(format_args!("{}", summary(&rendered, output)));
@@ -90,6 +91,15 @@ fn render(
         Outcome::Finished | Outcome::TimeLimit => ExitCode::SUCCESS,
         Outcome::Interrupted => ExitCode::from(STOPPED_EARLY),
     })
+}
+
+/// Channels that the scene asks for beside the radiance.
+fn further_channels(args: &RenderArgs, scene: &Scene, spp: u32) -> Result<Vec<(String, Vec<f32>)>, CliError> {
+    let alpha = scene.film.pixel_format.alpha;
+    if scene.aovs.is_empty() && !alpha {
+        return Ok(Vec::new());
+    }
+    Ok(aov::render(&backend::pack(scene, args.seed)?, &scene.aovs, alpha, spp.min(aov::AOV_SAMPLES)))
 }
 
 /// Says that there are doubts about the scene, and where to read them.

@@ -19,7 +19,12 @@ use super::{Attribute, Channel, Image, ImageError, Metadata, Window};
 pub fn write(path: &Path, image: &Image) -> Result<(), ImageError> {
     let metadata = &image.metadata;
     let channels = image.channels.iter().map(|channel| {
-        let samples = openexr::FlatSamples::F32(channel.samples.clone());
+        let exact = channel.name == "sampleCount" || channel.name.starts_with("Variance.");
+        let samples = if metadata.half && !exact {
+            openexr::FlatSamples::F16(channel.samples.iter().copied().map(openexr::f16::from_f32).collect())
+        } else {
+            openexr::FlatSamples::F32(channel.samples.clone())
+        };
         openexr::AnyChannel::new(text(&channel.name), samples)
     });
     let attributes = openexr::LayerAttributes {
@@ -116,6 +121,7 @@ fn metadata(shared: &openexr::ImageAttributes, own: &openexr::LayerAttributes) -
         },
         world_to_camera: own.world_to_camera,
         world_to_ndc: own.world_to_normalized_device,
+        half: false,
         attributes: (shared.other.iter().chain(&own.other))
             .filter_map(|(name, value)| Some((string(name), from_openexr(value)?)))
             .collect(),

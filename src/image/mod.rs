@@ -48,6 +48,8 @@ pub struct Metadata {
     /// World space to the unit square of the display window, (0, 0) in its upper left corner, as OpenEXR defines
     /// `worldToNDC`. Same layout as `world_to_camera`.
     pub world_to_ndc: Option<[f32; 16]>,
+    /// Channels are written in half precision, but for those of errors and counts. Not read back.
+    pub half: bool,
     /// Everything else, by name.
     pub attributes: BTreeMap<String, Attribute>,
 }

@@ -2,7 +2,7 @@
 
 use super::Packed;
 use super::layout::*;
-use crate::scene::{Integrator, Scene};
+use crate::scene::{Integrator, Lens, Scene};
 
 /// Constants of the kernel, decided once for a scene. Each becomes a `const` of `features.glsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +65,16 @@ pub struct Features {
     pub masks: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
+    /// Surfaces with more than one BSDF.
+    pub blends: bool,
+    /// Maps of normals or heights.
+    pub reliefs: bool,
+    /// A camera with a thin lens.
+    pub lens: bool,
+    /// A camera whose rays are parallel.
+    pub orthographic: bool,
+    /// A reconstruction filter other than a box of one pixel.
+    pub filter: bool,
     /// Emitters are not seen by the camera directly.
     pub hide_emitters: bool,
     /// Light is sampled at the vertices of paths.
@@ -121,7 +131,9 @@ impl Features {
             conductor: bsdf(BSDF_CONDUCTOR),
             plastic: bsdf(BSDF_PLASTIC),
             rough_plastic: packed.surfaces.iter().any(|surface| surface.value_count != 0),
-            textures: packed.surfaces.iter().any(|surface| surface.textures_1 | surface.textures_2 != 0),
+            textures: packed.surfaces.iter().any(|surface| {
+                surface.textures_1 | surface.textures_2 | surface.share_texture | surface.relief_texture != 0
+            }),
             anisotropic: packed.surfaces.iter().any(|surface| surface.alpha != surface.alpha_v),
             shading_normals: flag(SURFACE_SMOOTH),
             masks: flag(SURFACE_MASK),
@@ -129,6 +141,11 @@ impl Features {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
             },
+            blends: packed.surfaces.iter().any(|surface| surface.other != 0),
+            reliefs: packed.surfaces.iter().any(|surface| surface.relief_texture != 0),
+            lens: matches!(scene.camera.lens, Lens::Thin { .. }),
+            orthographic: matches!(scene.camera.lens, Lens::Orthographic { .. }),
+            filter: packed.params.filter_cells != 0,
             hide_emitters,
             // Where the only light is a constant sky and nothing absorbs on the way, scattered rays find it just as well.
             light_sampling: max_depth > 1
@@ -175,6 +192,10 @@ impl Features {
             masks: true,
             far_clip: true,
             tree: true,
+            blends: true,
+            reliefs: true,
+            lens: true,
+            filter: true,
             ..self
         }
     }
@@ -213,6 +234,11 @@ impl Features {
             ("HAS_SHADING_NORMALS", self.shading_normals),
             ("HAS_MASK", self.masks),
             ("HAS_FAR_CLIP", self.far_clip),
+            ("HAS_BLENDS", self.blends),
+            ("HAS_RELIEFS", self.reliefs),
+            ("HAS_LENS", self.lens),
+            ("HAS_ORTHOGRAPHIC", self.orthographic),
+            ("HAS_FILTER", self.filter),
             ("HAS_HIDDEN_EMITTERS", self.hide_emitters),
             ("HAS_LIGHT_SAMPLING", self.light_sampling),
             ("HAS_MIS", self.mis),

@@ -145,8 +145,16 @@ gpu_struct! {
         first_value: u32,
         /// Of rough plastic: values from there on.
         value_count: u32,
-        /// Fills the sixteen bytes.
-        unused: u32,
+        /// Index of a surface that may be in the place of this one, plus one; 0 is none.
+        other: u32,
+        /// With which probability it is, where that is no matter of sides.
+        share: f32,
+        /// Texture that stands for `share`, plus one; 0 is none.
+        share_texture: u32,
+        /// Texture of turned normals or of heights, plus one; 0 is none.
+        relief_texture: u32,
+        /// Factor of heights, canonical units.
+        relief_scale: f32,
     }
 }
 
@@ -329,6 +337,27 @@ gpu_struct! {
         world_sigma_t: Vec3,
         /// Index of the first light that shines from all directions; these come last in the table.
         first_sky: u32,
+        /// Of a filter wider than a pixel: where its samples may lie begins here, in pixels of the film.
+        sample_area_begin: Vec2,
+        /// Where it ends.
+        sample_area_end: Vec2,
+        /// Index among the values of the filter's distribution: one more number than cells, and as many of its signed form.
+        first_filter_value: u32,
+        /// Cells of the table, from one end of the filter to the other.
+        filter_cells: u32,
+        /// Distance from the pixel's centre to the filter's ends, in pixels.
+        filter_radius: f32,
+        /// Of a thin lens, 1 / distance of the plane in focus.
+        inverse_focus: f32,
+        /// Of a thin lens, its first axis with the radius as its length; of an orthographic camera, the direction of view, while
+        /// `camera_corner` and its companions are places relative to the camera's centre.
+        lens_u: Vec3,
+        /// Pixels of a side of the pilot's blocks.
+        block_side: u32,
+        /// Of a thin lens, its second axis.
+        lens_v: Vec3,
+        /// Blocks in a row.
+        block_columns: u32,
         /// Lower corner of the cells of the pilot.
         pilot_origin: Vec3,
         /// Index of the first number of the pilot's cells: of each its mean, its worth and two that fill up.
@@ -337,14 +366,6 @@ gpu_struct! {
         pilot_scale: Vec3,
         /// Index of the first number of the pilot's blocks of pixels: of each one over the square of its radiance, and one that fills up.
         first_block: u32,
-        /// Pixels of a side of the pilot's blocks.
-        block_side: u32,
-        /// Blocks in a row.
-        block_columns: u32,
-        /// Fills the sixteen bytes.
-        unused_1: u32,
-        /// Fills the sixteen bytes.
-        unused_2: u32,
     }
 }
 
@@ -392,8 +413,20 @@ pub const SURFACE_MASK: u32 = 32;
 pub const SURFACE_SMOOTH: u32 = 64;
 /// Bit 7: texture coordinates are needed.
 pub const SURFACE_UVS: u32 = 128;
+/// Bit 8: `other` takes the place of the surface where it is seen from behind.
+pub const SURFACE_SIDES: u32 = 256;
+/// Bit 9: where the choice of `other` is by sides, it is seen in front; where it is by a texture, 1 minus that is its share.
+pub const SURFACE_INVERTED: u32 = 512;
+/// Bit 10: `relief_texture` has heights, not normals.
+pub const SURFACE_HEIGHTS: u32 = 1024;
+/// Bit 11: turned normals that are seen from behind are turned the other way.
+pub const SURFACE_RELIEF_FLIPS: u32 = 2048;
+/// Bit 12: light fades out where it grazes the surface under turned normals.
+pub const SURFACE_RELIEF_FADES: u32 = 4096;
+/// Bit 13: seen from behind, normals are turned to the same sides as in front.
+pub const SURFACE_RELIEF_TURNS: u32 = 8192;
 /// Where the kind of BSDF begins in [`Surface::flags`].
-pub const SURFACE_KIND_SHIFT: u32 = 8;
+pub const SURFACE_KIND_SHIFT: u32 = 16;
 /// Kind of BSDF: Lambert's law.
 pub const BSDF_DIFFUSE: u32 = 0;
 /// Kind of BSDF: smooth or rough glass.
@@ -474,6 +507,12 @@ pub fn glsl() -> String {
         ("SURFACE_MASK", SURFACE_MASK),
         ("SURFACE_SMOOTH", SURFACE_SMOOTH),
         ("SURFACE_UVS", SURFACE_UVS),
+        ("SURFACE_SIDES", SURFACE_SIDES),
+        ("SURFACE_INVERTED", SURFACE_INVERTED),
+        ("SURFACE_HEIGHTS", SURFACE_HEIGHTS),
+        ("SURFACE_RELIEF_FLIPS", SURFACE_RELIEF_FLIPS),
+        ("SURFACE_RELIEF_FADES", SURFACE_RELIEF_FADES),
+        ("SURFACE_RELIEF_TURNS", SURFACE_RELIEF_TURNS),
         ("SURFACE_KIND_SHIFT", SURFACE_KIND_SHIFT),
         ("BSDF_DIFFUSE", BSDF_DIFFUSE),
         ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),
@@ -503,6 +542,7 @@ pub fn glsl() -> String {
         ("POINT_BITS", sobol::POINT_BITS),
         ("POINT_COUNT", sobol::POINT_COUNT),
         ("SOBOL_SETS", sobol::SOBOL_SETS),
+        ("LENS_SET", sobol::LENS_SET),
     ]
     .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
     .concat();

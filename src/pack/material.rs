@@ -2,13 +2,13 @@
 
 use super::layout::*;
 use super::texture::TextureTable;
-use crate::scene::{Bsdf, Distribution, Roughness, Texture};
+use crate::scene::{Bsdf, Distribution, ReliefMap, Roughness, Texture};
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::PI;
 
-/// What a BSDF puts into a surface; the rest of it is left at its default. Colours that depend on the place are their mean there, by
+/// What a BSDF of one part puts into a surface; the rest of it is left at its default. Colours that depend on the place are their mean there, by
 /// which lobes are chosen, and an entry of `textures`. Tables go to the `values`.
-pub fn pack(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) -> Surface {
+fn pack_part(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) -> Surface {
     let mut color = |texture: &Texture| textures.add(texture, values);
     match bsdf {
         Bsdf::Diffuse { reflectance, two_sided } => {
@@ -59,14 +59,62 @@ pub fn pack(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) -> 
                 ..rough(smooth, roughness)
             }
         }
-        Bsdf::Mask { nested, .. } if is_null(nested) => hole(),
-        Bsdf::Mask { opacity, nested } => {
-            let (opacity, texture) = color(opacity);
-            let nested = pack(nested, textures, values);
-            let flags = nested.flags | if texture != 0 || opacity.x < 1.0 { SURFACE_MASK } else { 0 };
-            Surface { flags, opacity: opacity.x, textures_2: nested.textures_2 | texture << 16, ..nested }
+        // What is left is nothing at all, or has parts that `pack_chain` puts together.
+        Bsdf::Null | Bsdf::Mask { .. } | Bsdf::Blend { .. } | Bsdf::Sides { .. } | Bsdf::Relief { .. } => hole(),
+    }
+}
+
+/// The surfaces of a BSDF that may have several parts: each may be in the place of the one before it. That their order can be
+/// such, `support` sees to.
+pub fn pack_chain(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) -> Vec<Surface> {
+    match bsdf {
+        Bsdf::Blend { weight, first, second } => {
+            let (first, second) = (pack_chain(first, textures, values), pack_chain(second, textures, values));
+            let (share, share_texture) = textures.add(weight, values);
+            let inverted = first.len() > 1;
+            let (mut chain, behind) = if inverted { (second, first) } else { (first, second) };
+            chain[0].share = if inverted { 1.0 - share.x } else { share.x };
+            chain[0].share_texture = share_texture;
+            chain[0].flags |= if inverted { SURFACE_INVERTED } else { 0 };
+            chain.extend(behind);
+            chain
         }
-        Bsdf::Null => hole(),
+        Bsdf::Sides { front, back } => {
+            let (front, back) = (pack_chain(front, textures, values), pack_chain(back, textures, values));
+            let inverted = front.len() > 1;
+            let (mut chain, behind) = if inverted { (back, front) } else { (front, back) };
+            chain[0].flags |= SURFACE_SIDES | if inverted { SURFACE_INVERTED } else { 0 };
+            chain.extend(behind);
+            chain
+        }
+        Bsdf::Relief { relief, nested } => {
+            let (map, scale, heights) = match &relief.map {
+                ReliefMap::Normals(map) => (map, 0.0, 0),
+                ReliefMap::Heights(map, scale) => (map, *scale, SURFACE_HEIGHTS),
+            };
+            let texture = textures.add_entry(map, values);
+            let flags = heights
+                | if relief.flips { SURFACE_RELIEF_FLIPS } else { 0 }
+                | if relief.fades { SURFACE_RELIEF_FADES } else { 0 }
+                | if relief.around_two_sides { SURFACE_RELIEF_TURNS } else { 0 };
+            let mut chain = pack_chain(nested, textures, values);
+            for surface in &mut chain {
+                surface.flags |= flags;
+                surface.relief_texture = texture;
+                surface.relief_scale = scale as f32;
+            }
+            chain
+        }
+        Bsdf::Mask { opacity, nested } if !is_null(nested) => {
+            let mut chain = pack_chain(nested, textures, values);
+            let (opacity, texture) = textures.add(opacity, values);
+            let first = &mut chain[0];
+            first.flags |= if texture != 0 || opacity.x < 1.0 { SURFACE_MASK } else { 0 };
+            first.opacity = opacity.x;
+            first.textures_2 |= texture << 16;
+            chain
+        }
+        _ => vec![pack_part(bsdf, textures, values)],
     }
 }
 

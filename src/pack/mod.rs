@@ -1,11 +1,12 @@
 //! From the description of a scene to flat tables, the form that the GPU and the CPU reference both read.
 
-use crate::scene::{self, Geometry, MediumId, Scene, Shape};
+use crate::scene::{self, AovKind, Geometry, Lens, MediumId, Scene, Shape};
 use glam::{DMat3, DVec3, Vec3};
 
 pub mod bvh;
 pub mod emission;
 pub mod features;
+pub mod filter;
 mod flight;
 pub mod frame;
 pub mod immediate;
@@ -38,7 +39,7 @@ pub struct Packed {
     pub primitives: Vec<Primitive>,
     /// How many primitives are part of the kernel.
     pub immediate_count: usize,
-    /// One for each shape.
+    /// One for each shape, and behind them those that may be in the place of one of these.
     pub surfaces: Vec<Surface>,
     /// Media; entry 0 is vacuum, entry `k` is `MediumId(k − 1)`.
     pub media: Vec<Medium>,
@@ -115,6 +116,12 @@ pub enum PackError {
         /// The largest value, times the scale.
         value: f64,
     },
+    /// A camera whose rays do not all begin in the same medium.
+    #[error(
+        "the boundary \"{0}\" cuts through where the rays of the camera begin, so that they would begin in different media; \
+         move the camera, or its near_clip, to one side of it"
+    )]
+    StraddlingCamera(String),
     /// Part of a scene that kernels cannot render yet.
     #[error("{what} of \"{name}\" cannot be rendered yet")]
     Unsupported {
@@ -134,6 +141,9 @@ impl Packed {
         support::check(scene)?;
         let frame = Frame::of(scene);
         let nesting = Nesting::of(scene);
+        if let Some(shape) = nesting.straddled {
+            return Err(PackError::StraddlingCamera(scene.shapes[shape].name.clone()));
+        }
         if scene.media.len() > MAX_MEDIA {
             return Err(PackError::TooManyMedia(scene.media.len()));
         }
@@ -144,17 +154,28 @@ impl Packed {
         let mut lights = LightTable::default();
         let mut textures = TextureTable::default();
         let mut corners = Vec::new();
+        let mut others = Vec::new();
         for (index, shape) in scene.shapes.iter().enumerate() {
-            let surface = pack_surface(shape, nesting.exteriors[index], &media, &mut textures, &mut values);
+            let mut chain = pack_surfaces(shape, nesting.exteriors[index], &media, &frame, &mut textures, &mut values);
+            // What may be in the place of a shape's surface stands behind those of all shapes.
+            let links = chain.len() - 1;
+            for (link, surface) in chain.iter_mut().take(links).enumerate() {
+                surface.other = (scene.shapes.len() + others.len() + link) as u32 + 1;
+            }
+            others.extend(chain.drain(1..));
+            let surface = chain[0];
             let first = primitives.len();
             pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights);
-            if surface.flags & (SURFACE_SMOOTH | SURFACE_UVS) != 0 {
+            // Of a shape that is not packed at all there is nothing to see.
+            let described = scene.aovs.iter().any(|aov| aov.kind == AovKind::Uv) && primitives.len() > first;
+            if surface.flags & (SURFACE_SMOOTH | SURFACE_UVS) != 0 || described {
                 corners.resize(first, Corners::default());
                 corners.extend(texture::corners(shape));
                 assert_eq!(corners.len(), primitives.len(), "one entry for each primitive");
             }
             surfaces.push(surface);
         }
+        surfaces.append(&mut others);
         let mut textures = textures.textures;
         if textures.len() > texture::MAX_TEXTURES {
             return Err(PackError::TooManyTextures(textures.len()));
@@ -178,6 +199,7 @@ impl Packed {
         let lights = lights.finish();
         flight::choose_equiangular(scene, &nesting, &frame, &lights, &mut media);
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
+        filter::pack(&scene.film, &mut params, &mut values);
         params = Params {
             seed,
             grid_origin: bvh.grid_origin,
@@ -288,6 +310,11 @@ const EMPTY_FEATURES: Features = Features {
     shading_normals: false,
     masks: false,
     far_clip: false,
+    blends: false,
+    reliefs: false,
+    lens: false,
+    orthographic: false,
+    filter: false,
     hide_emitters: false,
     light_sampling: false,
     mis: true,
@@ -327,27 +354,30 @@ fn pack_media(
     Ok(media)
 }
 
-fn pack_surface(
+/// A shape's surface, and those that may be in its place, of which each may be in the place of the one before it.
+fn pack_surfaces(
     shape: &Shape,
     exterior: Option<MediumId>,
     media: &[Medium],
+    frame: &Frame,
     textures: &mut TextureTable,
     values: &mut Vec<f32>,
-) -> Surface {
+) -> Vec<Surface> {
     let (inside, outside) = match shape.boundary {
         Some(boundary) => (medium_index(boundary.interior), medium_index(exterior)),
         None => (0, 0),
     };
-    let material = material::pack(&shape.bsdf, textures, values);
+    let mut chain = material::pack_chain(&shape.bsdf, textures, values);
     let smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
     let smooth = if smooth && !material::is_null(&shape.bsdf) { SURFACE_SMOOTH } else { 0 };
     let uvs = if shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };
-    Surface {
-        flags: material.flags | smooth | uvs,
-        sigma_t_step: media[inside as usize].sigma_t - media[outside as usize].sigma_t,
-        media: inside | outside << 16,
-        ..material
+    for surface in &mut chain {
+        surface.flags |= smooth | uvs;
+        surface.sigma_t_step = media[inside as usize].sigma_t - media[outside as usize].sigma_t;
+        surface.media = inside | outside << 16;
+        surface.relief_scale *= frame.scale as f32;
     }
+    chain
 }
 
 /// Appends a shape's primitives, and its lights if it emits.
@@ -444,11 +474,25 @@ fn pack_camera(scene: &Scene, frame: &Frame, medium: u32) -> Params {
         matrix.y_axis.truncate().normalize(),
         matrix.z_axis.truncate().normalize(),
     );
-    let half_width = (camera.fov_x.to_radians() / 2.0).tan();
-    let half_height = half_width * f64::from(film.height) / f64::from(film.width);
+    let (half_width, half_height) = match camera.lens {
+        Lens::Orthographic { half_width, half_height } => (half_width * frame.scale, half_height * frame.scale),
+        _ => {
+            let half_width = (camera.fov_x.to_radians() / 2.0).tan();
+            (half_width, half_width * f64::from(film.height) / f64::from(film.width))
+        }
+    };
+    let (lens_u, lens_v, inverse_focus) = match camera.lens {
+        Lens::Pinhole => (DVec3::ZERO, DVec3::ZERO, 0.0),
+        Lens::Thin { aperture_radius, focus_distance } => {
+            let radius = aperture_radius * frame.scale;
+            (rotation.x_axis * radius, rotation.y_axis * radius, 1.0 / (focus_distance * frame.scale))
+        }
+        Lens::Orthographic { .. } => (rotation.z_axis, DVec3::ZERO, 0.0),
+    };
+    let depth = if matches!(camera.lens, Lens::Orthographic { .. }) { 0.0 } else { 1.0 };
     let offset = camera.principal_point_offset;
     // Camera space has +x to the left, so the film's left edge is at +x.
-    let corner = DVec3::new(half_width * (1.0 - 2.0 * offset.x), half_height * (1.0 - 2.0 * offset.y), 1.0);
+    let corner = DVec3::new(half_width * (1.0 - 2.0 * offset.x), half_height * (1.0 - 2.0 * offset.y), depth);
     Params {
         camera_origin: frame.point(matrix.w_axis.truncate()),
         camera_medium: medium,
@@ -463,6 +507,9 @@ fn pack_camera(scene: &Scene, frame: &Frame, medium: u32) -> Params {
         crop_y: film.crop.y,
         crop_width: film.crop.width,
         crop_height: film.crop.height,
+        lens_u: lens_u.as_vec3(),
+        lens_v: lens_v.as_vec3(),
+        inverse_focus: inverse_focus as f32,
         ..Params::default()
     }
 }

@@ -5,8 +5,8 @@
 //! solid angle under which the surface is seen, over 4π, which needs no ray and is exact for closed meshes.
 
 use super::frame::Bounds;
-use crate::scene::{Geometry, MediumId, Mesh, Scene, Shape};
-use glam::DVec3;
+use crate::scene::{Geometry, Lens, MediumId, Mesh, Scene, Shape};
+use glam::{DVec2, DVec3};
 
 /// The media that geometry decides.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Nesting {
     pub world: Option<MediumId>,
     /// The medium at the camera.
     pub camera: Option<MediumId>,
+    /// A shape whose surface rays from a lens or a rectangle begin on both sides of, so that there is no one medium at the camera.
+    pub straddled: Option<usize>,
     /// What contradicts itself, for people.
     pub warnings: Vec<String>,
 }
@@ -79,8 +81,61 @@ impl Nesting {
             }
             exteriors[index] = votes.first().and_then(|(medium, _)| *medium);
         }
-        Nesting { exteriors, world, camera, warnings }
+        Nesting { exteriors, world, camera, straddled: straddled(scene), warnings }
     }
+}
+
+/// The first boundary that cuts the part of the near plane on which the rays of a camera with a lens, or without a centre, begin. A
+/// triangle is taken for the rectangle about its cut, so that some are found that only come near.
+fn straddled(scene: &Scene) -> Option<usize> {
+    let (camera, film) = (&scene.camera, &scene.film);
+    let (half_width, half_height, blur) = match camera.lens {
+        Lens::Pinhole => return None,
+        Lens::Thin { aperture_radius, focus_distance } => {
+            let half_width = camera.near_clip * (camera.fov_x.to_radians() / 2.0).tan();
+            let half_height = half_width * f64::from(film.height) / f64::from(film.width);
+            (half_width, half_height, aperture_radius * (1.0 - camera.near_clip / focus_distance).abs())
+        }
+        Lens::Orthographic { half_width, half_height } => (half_width, half_height, 0.0),
+    };
+    // Samples lie beyond the edges of the film by no more than the filter's radius.
+    let beyond = 2.0 * half_width / f64::from(film.width) * film.filter.radius() + blur;
+    let center = -2.0 * camera.principal_point_offset * DVec2::new(half_width, half_height);
+    let half = DVec2::new(half_width, half_height) + beyond;
+    let (low, high) = (center - half, center + half);
+    let to_camera = camera.to_world.inverse();
+    // A uniform scale of the camera is of no account to its clip planes.
+    let scale = camera.to_world.z_axis.truncate().length();
+    let place = |point: DVec3| {
+        let point = to_camera.transform_point3(point) * scale;
+        (point.truncate(), point.z - camera.near_clip)
+    };
+    let overlaps = |points: &[DVec2]| {
+        let least = points.iter().copied().reduce(DVec2::min).expect("a cut has points");
+        let most = points.iter().copied().reduce(DVec2::max).expect("a cut has points");
+        least.cmple(high).all() && most.cmpge(low).all()
+    };
+    scene.shapes.iter().position(|shape| {
+        shape.boundary.is_some()
+            && match &shape.geometry {
+                Geometry::Sphere { center, radius, .. } => {
+                    let (middle, depth) = place(*center);
+                    let cut = (radius * radius - depth * depth).max(0.0).sqrt();
+                    let corners = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)];
+                    let inside = corners.iter().all(|corner| corner.distance(middle) < cut);
+                    cut > 0.0 && !inside && overlaps(&[middle - cut, middle + cut])
+                }
+                Geometry::Mesh(mesh) => mesh.triangles.iter().any(|triangle| {
+                    let corners = triangle.map(|corner| place(mesh.positions[corner as usize]));
+                    let cuts: Vec<DVec2> = [(0, 1), (1, 2), (2, 0)]
+                        .into_iter()
+                        .filter(|&(i, j)| (corners[i].1 >= 0.0) != (corners[j].1 >= 0.0))
+                        .map(|(i, j)| corners[i].0.lerp(corners[j].0, corners[i].1 / (corners[i].1 - corners[j].1)))
+                        .collect();
+                    !cuts.is_empty() && overlaps(&cuts)
+                }),
+            }
+    })
 }
 
 fn medium_name(scene: &Scene, medium: Option<MediumId>) -> String {

@@ -10,8 +10,12 @@
 pub const POINT_COUNT: u32 = 1 << POINT_BITS;
 /// Binary digits of a point's index.
 pub const POINT_BITS: u32 = 10;
-/// Sets of four dimensions in the table.
+/// Sets of four dimensions in the table, of a path's first segments.
 pub const SOBOL_SETS: u32 = 4;
+/// Index of one more set of the table, for the place on a camera's lens.
+pub const LENS_SET: u32 = SOBOL_SETS;
+/// All sets of the table.
+const TABLE_SETS: u32 = SOBOL_SETS + 1;
 /// The scrambling is part of the definition of the random numbers, like the constants of a hash.
 const SCRAMBLING: u32 = 0x9e37_79b9;
 
@@ -60,8 +64,8 @@ fn scramble(digits: u32, seed: u32) -> u32 {
 /// first word, the others in the second.
 pub fn points() -> Vec<[u32; 2]> {
     let directions = directions();
-    let mut table = Vec::with_capacity((SOBOL_SETS * POINT_COUNT) as usize);
-    for set in 0..SOBOL_SETS {
+    let mut table = Vec::with_capacity((TABLE_SETS * POINT_COUNT) as usize);
+    for set in 0..TABLE_SETS {
         let seed = |purpose: u32| scramble(SCRAMBLING, (set * 8 + purpose + 1).wrapping_mul(0x85eb_ca6b));
         for index in 0..POINT_COUNT {
             let shuffled = scramble(index, seed(0));
@@ -103,7 +107,7 @@ mod tests {
     #[test]
     fn aligned_runs_are_nets() {
         let table = points();
-        assert_eq!(table.len(), (SOBOL_SETS * POINT_COUNT) as usize);
+        assert_eq!(table.len(), (TABLE_SETS * POINT_COUNT) as usize);
         for set in table.chunks(POINT_COUNT as usize) {
             for bits in 0..=POINT_BITS {
                 for run in set.chunks(1 << bits) {

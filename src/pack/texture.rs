@@ -23,8 +23,25 @@ impl TextureTable {
     /// Adds a texture, and the pixels of its image to the `values` unless they are there. Returns its mean over the image or the
     /// pattern, and its index plus one; of a constant colour the colour and 0.
     pub fn add(&mut self, texture: &scene::Texture, values: &mut Vec<f32>) -> (Vec3, u32) {
+        match texture {
+            scene::Texture::Constant(color) => (color.as_vec3(), 0),
+            _ => self.entry(texture, values),
+        }
+    }
+
+    /// The same of a texture that must have an entry, be it constant. Returns its index plus one.
+    pub fn add_entry(&mut self, texture: &scene::Texture, values: &mut Vec<f32>) -> u32 {
+        self.entry(texture, values).1
+    }
+
+    fn entry(&mut self, texture: &scene::Texture, values: &mut Vec<f32>) -> (Vec3, u32) {
         let (mean, entry) = match texture {
-            scene::Texture::Constant(color) => return (color.as_vec3(), 0),
+            scene::Texture::Constant(color) => {
+                let color = color.as_vec3();
+                let entry =
+                    Texture { kind: TEXTURE_CHECKERBOARD, color_0: color, color_1: color, ..Texture::default() };
+                (color.as_dvec3(), entry)
+            }
             scene::Texture::Checkerboard { color0, color1, to_uv } => {
                 let entry = Texture {
                     kind: TEXTURE_CHECKERBOARD,

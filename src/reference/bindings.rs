@@ -2,7 +2,7 @@
 
 use crate::pack::features::Features;
 use crate::pack::{Packed, layout, sobol};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// What the kernel reads.
 #[derive(Clone, Debug)]
@@ -67,6 +67,11 @@ pub struct Surface {
     pub opacity: f64,
     pub first_value: u32,
     pub value_count: u32,
+    pub other: u32,
+    pub share: f64,
+    pub share_texture: u32,
+    pub relief_texture: u32,
+    pub relief_scale: f64,
 }
 
 /// See [`layout::Medium`].
@@ -146,6 +151,14 @@ pub struct Params {
     pub first_block: u32,
     pub block_side: u32,
     pub block_columns: u32,
+    pub sample_area_begin: DVec2,
+    pub sample_area_end: DVec2,
+    pub first_filter_value: u32,
+    pub filter_cells: u32,
+    pub filter_radius: f64,
+    pub inverse_focus: f64,
+    pub lens_u: DVec3,
+    pub lens_v: DVec3,
 }
 
 impl Tables {
@@ -212,6 +225,11 @@ impl From<&layout::Surface> for Surface {
             opacity: f64::from(from.opacity),
             first_value: from.first_value,
             value_count: from.value_count,
+            other: from.other,
+            share: f64::from(from.share),
+            share_texture: from.share_texture,
+            relief_texture: from.relief_texture,
+            relief_scale: f64::from(from.relief_scale),
         }
     }
 }
@@ -295,6 +313,14 @@ impl From<&layout::Params> for Params {
             first_block: from.first_block,
             block_side: from.block_side,
             block_columns: from.block_columns,
+            sample_area_begin: from.sample_area_begin.as_dvec2(),
+            sample_area_end: from.sample_area_end.as_dvec2(),
+            first_filter_value: from.first_filter_value,
+            filter_cells: from.filter_cells,
+            filter_radius: f64::from(from.filter_radius),
+            inverse_focus: f64::from(from.inverse_focus),
+            lens_u: from.lens_u.as_dvec3(),
+            lens_v: from.lens_v.as_dvec3(),
         }
     }
 }

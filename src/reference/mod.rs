@@ -10,6 +10,7 @@ pub mod bvh;
 pub mod camera;
 pub mod equiangular;
 pub mod film;
+pub mod filter;
 pub mod light;
 pub mod math;
 pub mod medium;
@@ -89,10 +90,11 @@ impl Renderer {
         let pixel = (y + params.crop_y) * params.film_width + x + params.crop_x;
         let mut sums = PixelSums::default();
         for sample_index in samples {
-            let value = trace(&self.tables, pixel, sample_index);
+            let (value, filter_weight) = weighted_radiance(&self.tables, pixel, sample_index);
             sums.sum += value;
             sums.squares += value * value;
-            if let Some(cause) = invalid_cause(value, self.tables.features.pilot) {
+            let positive = if filter_weight < 0.0 { -value } else { value };
+            if let Some(cause) = invalid_cause(positive, self.tables.features.pilot) {
                 sums.invalid[cause] += 1;
             }
         }
@@ -138,14 +140,19 @@ pub fn sample_radiance(packed: &Packed, pixel: u32, sample_index: u32) -> DVec3 
     trace(&Tables::new(packed), pixel, sample_index)
 }
 
-/// Mirror of the loop of `path_trace.comp` for one sample.
+/// Mirror of the loop of `path_trace.comp` for one sample: what it adds to its pixel.
 pub fn trace(tables: &Tables, pixel: u32, sample_index: u32) -> DVec3 {
+    weighted_radiance(tables, pixel, sample_index).0
+}
+
+/// What a sample adds to its pixel, and its factor by the reconstruction filter, which may be negative.
+fn weighted_radiance(tables: &Tables, pixel: u32, sample_index: u32) -> (DVec3, f64) {
     let mut path = path_start(tables, pixel, sample_index);
     while path.alive || path.shadow {
         let hit = traverse(tables, &path);
         path_answer(tables, &mut path, &hit);
     }
-    path.radiance
+    (path.radiance * path.filter_weight, path.filter_weight)
 }
 
 /// Answers the ray that a path asks for.

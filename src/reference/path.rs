@@ -1,9 +1,10 @@
 //! Mirror of `shaders/lib/path.glsl`: the estimator, a path as a coroutine that asks for one ray at a time. A path's
 //! life is described there. What the kernel leaves out where a scene does not need it is always here.
 
-use super::bindings::{Medium, Surface, Tables};
+use super::bindings::{Medium, Params, Surface, Tables};
 use super::bsdf::bsdf_has_density;
-use super::camera::camera_direction;
+use super::camera::{camera_direction, focused_direction, lens_point};
+use super::filter::sample_filter;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::channel_weights;
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
@@ -11,15 +12,19 @@ use super::path_flight::{end_flight, enter_medium, flight_point, flight_side, fr
 use super::path_lights::{add_emission, add_medium_emission, add_sky, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
-use super::path_state::{INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_set, survived_throughput};
-use super::path_surface::{Place, apply_textures, opacity_at, shading_normal, surface_tangent, texture_coordinates};
+use super::path_state::{
+    INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_lens, sample_set, survived_throughput,
+};
+use super::path_surface::{
+    Place, apply_textures, opacity_at, shading_normal, share_at, surface_tangent, texture_coordinates, turn_frame,
+};
 use super::path_vertex::{
     Vertex, medium_towards, offset_origin, sample_scattering, sides_agree, surface_point, to_surface_frame,
 };
 use super::ray::offset_distance;
 use crate::pack::layout::{
-    LIGHT_VOLUME, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SMOOTH,
-    SURFACE_TWO_SIDED,
+    LIGHT_VOLUME, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED, SURFACE_MASK, SURFACE_ORIENTED,
+    SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
 };
 use glam::{DVec2, DVec3, UVec2, Vec4Swizzles};
 
@@ -27,6 +32,25 @@ use glam::{DVec2, DVec3, UVec2, Vec4Swizzles};
 const RELENTLESS_DEPTH: u32 = 256;
 /// The sets of random numbers by which light meets masks or passes them begin here.
 const MASK_SETS: u32 = 0x8000_0000;
+/// The sets by which one of several BSDFs of a surface is chosen, one for each segment.
+const BLEND_SETS: u32 = 0xc000_0000;
+
+/// Where a sample of the pixel with the given upper left corner lies on the film, in pixels, and its factor by the filter.
+fn filtered_place(tables: &Tables, path: &mut Path, corner: DVec2, u: DVec2) -> DVec2 {
+    path.filter_weight = 1.0;
+    let Params { sample_area_begin, sample_area_end, first_filter_value, filter_cells, filter_radius, .. } =
+        tables.params;
+    if filter_cells == 0 {
+        return corner + u;
+    }
+    let center = corner + 0.5;
+    let (low, high) = (sample_area_begin - center, sample_area_end - center);
+    let values = &tables.values[first_filter_value as usize..];
+    let x = sample_filter(values, filter_cells, filter_radius, DVec2::new(low.x, high.x), u.x);
+    let y = sample_filter(values, filter_cells, filter_radius, DVec2::new(low.y, high.y), u.y);
+    path.filter_weight = x.weight * y.weight;
+    center + DVec2::new(x.offset, y.offset)
+}
 
 /// A ray from the camera, and a free flight for its first segment.
 pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
@@ -34,11 +58,20 @@ pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     let params = &tables.params;
     let u = sample_set(tables, &path, 0);
     let (row, column) = (pixel / params.film_width, pixel % params.film_width);
-    let film = (DVec2::new(f64::from(column), f64::from(row)) + u.xy())
-        * DVec2::new(params.inverse_width, params.inverse_height);
-    let direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
-    let depth_to_distance = direction.length();
+    let corner = DVec2::new(f64::from(column), f64::from(row));
+    let place = filtered_place(tables, &mut path, corner, u.xy());
+    let film = place * DVec2::new(params.inverse_width, params.inverse_height);
+    let mut direction = camera_direction(params.camera_corner, params.camera_right, params.camera_down, film);
     path.origin = params.camera_origin;
+    if tables.features.orthographic {
+        path.origin += direction;
+        direction = params.lens_u;
+    } else if tables.features.lens {
+        let point = lens_point(params.lens_u, params.lens_v, sample_lens(tables, &path).xy());
+        path.origin += point;
+        direction = focused_direction(direction, point, params.inverse_focus);
+    }
+    let depth_to_distance = direction.length();
     path.direction = direction / depth_to_distance;
     path.t_min = params.near_clip * depth_to_distance;
     path.far_end = params.far_clip * depth_to_distance;
@@ -154,6 +187,31 @@ fn passes_mask(tables: &Tables, path: &mut Path, surface: &Surface, place: &Plac
     u >= opacity
 }
 
+/// The one of the BSDFs of a surface that acts at this vertex: by the side, or by chance.
+fn chosen_surface<'a>(
+    tables: &'a Tables,
+    path: &Path,
+    mut surface: &'a Surface,
+    place: &Place,
+    back: bool,
+) -> &'a Surface {
+    let mut u = sample_set(tables, path, BLEND_SETS + path.segment).x;
+    while surface.other != 0 {
+        let mut taken = back != (surface.flags & SURFACE_INVERTED != 0);
+        if surface.flags & SURFACE_SIDES == 0 {
+            let share = share_at(tables, surface, place);
+            taken = u < share;
+            // What is left of the number is uniform again.
+            u = if taken { (u / share).min(1.0 - 0.5f64.powi(24)) } else { u };
+        }
+        if !taken {
+            break;
+        }
+        surface = &tables.surfaces[surface.other as usize - 1];
+    }
+    surface
+}
+
 /// What a ray that extends the path meets: a vertex that scatters, or else the path ends, or goes on along the same ray.
 fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     let surface_hit = hit.primitive != NONE && hit.t < path.t_max;
@@ -172,7 +230,21 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         let Medium { g, phase, .. } = medium;
         let (tangent, normal) = (DVec3::ZERO, path.direction);
         let albedo = end.weight;
-        return Some(Vertex { point, axis, in_medium: true, g, phase, albedo, surface, incident, tangent, normal });
+        let (in_medium, base, fade) = (true, axis, 0.0);
+        return Some(Vertex {
+            point,
+            axis,
+            in_medium,
+            g,
+            phase,
+            albedo,
+            surface,
+            incident,
+            tangent,
+            normal,
+            base,
+            fade,
+        });
     }
     // The optical depth of the way through the medium since `t_min`.
     let way = t - path.t_min;
@@ -200,6 +272,7 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     }
     path.throughput = survived_throughput(path);
     let back = path.direction.dot(normal) > 0.0;
+    let surface = chosen_surface(tables, path, surface, &place, back);
     // Where a surface is seen from one side, but its shading normal from the other one, nothing is reflected.
     let seen = !back || surface.flags & (SURFACE_TWO_SIDED | SURFACE_ORIENTED) != 0;
     place.point = point;
@@ -209,6 +282,12 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     let (axis, normal) = if turned { (-axis, -normal) } else { (axis, normal) };
     let isotropic = surface.alpha == surface.alpha_v;
     let tangent = if isotropic { orthonormal_frame(axis).0 } else { surface_tangent(tables, &place, axis) };
+    let (base, mut axis, mut tangent, mut fade) = (axis, axis, tangent, 0.0);
+    if surface.relief_texture != 0 {
+        let frame = turn_frame(tables, surface, &place, -path.direction, turned, axis);
+        (axis, fade) = (frame.axis, frame.fade);
+        tangent = if isotropic { orthonormal_frame(axis).0 } else { frame.tangent };
+    }
     let mut surface = *surface;
     if surface.textures_1 | surface.textures_2 & 0xffff != 0 {
         apply_textures(tables, &mut surface, texture_coordinates(tables, &place));
@@ -218,7 +297,7 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     path.left = if primitive.surface & PRIMITIVE_SPHERE == 0 { hit.primitive } else { NONE };
     let incident = to_surface_frame(tangent, axis, -path.direction);
     let (in_medium, g, phase, albedo) = (false, 0.0, 0, DVec3::ZERO);
-    let vertex = Vertex { point, axis, in_medium, g, phase, albedo, surface, incident, tangent, normal };
+    let vertex = Vertex { point, axis, in_medium, g, phase, albedo, surface, incident, tangent, normal, base, fade };
     path.alive = seen && sides_agree(&vertex, incident.z, -path.direction);
     path.alive.then_some(vertex)
 }

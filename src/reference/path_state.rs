@@ -4,9 +4,9 @@ use super::bindings::{Medium, Tables};
 use super::light::{alias_keeps, alias_line};
 use super::math::minus_log_1m;
 use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
-use super::sampler::{point_index, set_key, shifted_point};
+use super::sampler::{lens_key, point_index, set_key, shifted_point};
 use crate::pack::layout;
-use crate::pack::sobol::SOBOL_SETS;
+use crate::pack::sobol::{LENS_SET, SOBOL_SETS};
 use glam::{DVec2, DVec3, DVec4};
 
 /// Nothing, among indices.
@@ -26,6 +26,8 @@ pub struct Path {
     pub pixel: u32,
     /// Of the pixel.
     pub sample_index: u32,
+    /// Factor of the radiance by the reconstruction filter; negative in its negative lobes.
+    pub filter_weight: f64,
     /// Of the ray that is asked for.
     pub origin: DVec3,
     /// Of the ray that is asked for; unit.
@@ -127,6 +129,12 @@ pub fn sample_set(tables: &Tables, path: &Path, set: u32) -> DVec4 {
     let point =
         if set < SOBOL_SETS { tables.points[point_index(set, path.sample_index, key) as usize] } else { [0; 2] };
     shifted_point(point, key)
+}
+
+/// The numbers for a camera's lens.
+pub fn sample_lens(tables: &Tables, path: &Path) -> DVec4 {
+    let key = lens_key(tables.params.seed, path.pixel, path.sample_index);
+    shifted_point(tables.points[point_index(LENS_SET, path.sample_index, key) as usize], key)
 }
 
 /// A medium by its index.

@@ -2,10 +2,13 @@
 
 use super::bindings::{Primitive, Surface, Tables};
 use super::math::{arctan2, orthonormal_frame};
-use super::texture::eval_texture;
-use crate::pack::layout::PRIMITIVE_SPHERE;
+use super::texture::{eval_texture, texture_gradient};
+use crate::pack::layout::{
+    PRIMITIVE_SPHERE, SURFACE_HEIGHTS, SURFACE_INVERTED, SURFACE_RELIEF_FADES, SURFACE_RELIEF_FLIPS,
+    SURFACE_RELIEF_TURNS,
+};
 use glam::{DVec2, DVec3};
-use std::f64::consts::FRAC_1_PI;
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
 /// A point on a primitive, as a ray finds it.
 #[derive(Clone, Copy, Debug)]
@@ -84,4 +87,100 @@ pub fn surface_tangent(tables: &Tables, place: &Place, axis: DVec3) -> DVec3 {
     };
     let along = along - axis * axis.dot(along);
     if along.length_squared() > 0.0 { along.normalize() } else { orthonormal_frame(axis).0 }
+}
+
+/// With which probability the other surface is in the place of a surface.
+pub fn share_at(tables: &Tables, surface: &Surface, place: &Place) -> f64 {
+    if surface.share_texture == 0 {
+        return surface.share;
+    }
+    let uv = texture_coordinates(tables, place);
+    let share =
+        eval_texture(&tables.textures[surface.share_texture as usize - 1], &tables.values, uv).x.clamp(0.0, 1.0);
+    if surface.flags & SURFACE_INVERTED != 0 { 1.0 - share } else { share }
+}
+
+/// The derivatives of the place on a primitive by the texture coordinates; `None` where these are degenerate.
+pub fn place_derivatives(tables: &Tables, place: &Place) -> Option<(DVec3, DVec3)> {
+    let primitive = tables.primitive(place.index);
+    if is_sphere(primitive) {
+        let outwards = place.point - primitive.a;
+        let flat = outwards.truncate();
+        let dp_du = TAU * DVec3::new(-outwards.y, outwards.x, 0.0);
+        let dp_dv = PI * (flat * (outwards.z / flat.length())).extend(-flat.length());
+        return (flat.length() > 0.0).then_some((dp_du, dp_dv));
+    }
+    let corners = &tables.corners[place.index as usize];
+    let [u_a, u_b, u_c] = [corners.u_a, corners.u_b, corners.u_c].map(f64::from);
+    let v = corners.v.as_dvec3();
+    let (u, v) = (DVec2::new(u_b - u_a, u_c - u_a), DVec2::new(v.y - v.x, v.z - v.x));
+    let (edge_1, edge_2) = (primitive.b - primitive.a, primitive.c - primitive.a);
+    let determinant = u.x * v.y - u.y * v.x;
+    let dp_du = (edge_1 * v.y - edge_2 * v.x) / determinant;
+    let dp_dv = (edge_2 * u.x - edge_1 * u.y) / determinant;
+    (determinant != 0.0).then_some((dp_du, dp_dv))
+}
+
+/// The normal of a height field over a surface with the normal n, in (s, t, n); not normalised.
+fn height_normal(tables: &Tables, surface: &Surface, place: &Place, [s, t, n]: [DVec3; 3]) -> DVec3 {
+    let Some((dp_du, dp_dv)) = place_derivatives(tables, place) else { return DVec3::Z };
+    let texture = &tables.textures[surface.relief_texture as usize - 1];
+    let slope = texture_gradient(texture, &tables.values, texture_coordinates(tables, place)) * surface.relief_scale;
+    let found = (dp_du + n * (slope.x - n.dot(dp_du))).cross(dp_dv + n * (slope.y - n.dot(dp_dv)));
+    let found = if found.dot(n) < 0.0 { -found } else { found };
+    DVec3::new(s.dot(found), t.dot(found), n.dot(found))
+}
+
+/// A frame that a map of normals or heights has turned.
+#[derive(Clone, Copy, Debug)]
+pub struct TurnedFrame {
+    /// The new normal.
+    pub axis: DVec3,
+    /// The new tangent.
+    pub tangent: DVec3,
+    /// The squared roughness by which light fades where it grazes the surface, 0 if it does not.
+    pub fade: f64,
+}
+
+/// Turns the frame of a BSDF by a map of normals or heights. `towards` is where the path comes from; `turned` says that the axis is
+/// on the back of the surface.
+pub fn turn_frame(
+    tables: &Tables,
+    surface: &Surface,
+    place: &Place,
+    towards: DVec3,
+    turned: bool,
+    axis: DVec3,
+) -> TurnedFrame {
+    let s = surface_tangent(tables, place, axis);
+    let front = if turned { -axis } else { axis };
+    let t = front.cross(s);
+    let mut n = if surface.flags & SURFACE_HEIGHTS != 0 {
+        height_normal(tables, surface, place, [s, t, front])
+    } else {
+        let texture = &tables.textures[surface.relief_texture as usize - 1];
+        2.0 * eval_texture(texture, &tables.values, texture_coordinates(tables, place)) - 1.0
+    };
+    let other_way = |n: DVec3| DVec3::new(-n.x, -n.y, n.z);
+    if turned && surface.flags & SURFACE_RELIEF_TURNS != 0 {
+        n = other_way(n);
+    }
+    let local = DVec3::new(s.dot(towards), t.dot(towards), axis.dot(towards));
+    if surface.flags & SURFACE_RELIEF_FLIPS != 0 && local.z * local.dot(n) <= 0.0 {
+        n = other_way(n);
+    }
+    let n = n.try_normalize().unwrap_or(DVec3::Z);
+    let along = (DVec3::X - n * n.x).try_normalize().unwrap_or(DVec3::Y);
+    let fades = surface.flags & SURFACE_RELIEF_FADES != 0;
+    TurnedFrame {
+        axis: (s * n.x + t * n.y + axis * n.z).normalize(),
+        tangent: (s * along.x + t * along.y + axis * along.z).normalize(),
+        fade: if fades { (0.125 * n.truncate().length_squared() / (n.z * n.z).max(1e-12)).min(1.0) } else { 0.0 },
+    }
+}
+
+/// What is left of light in a direction whose cosine to the interpolated normal is given (Conty Estevez, Lecocq and Stein 2019).
+pub fn relief_fading(squared_roughness: f64, cosine: f64) -> f64 {
+    let c2 = (cosine * cosine).max(1e-12);
+    2.0 / (1.0 + (1.0 + squared_roughness * (1.0 - c2).max(0.0) / c2).sqrt())
 }

@@ -5,6 +5,7 @@ use super::bsdf::{BsdfSample, BsdfValue, eval_bsdf, sample_bsdf};
 use super::math::{from_frame, max_component};
 use super::medium::{medium_code, medium_of_code};
 use super::path_state::{Hit, NONE, Path};
+use super::path_surface::relief_fading;
 use super::phase::{PhaseTables, eval_henyey_greenstein, eval_mixture, sample_henyey_greenstein, sample_mixture};
 use super::warp::from_polar;
 use crate::pack::layout::{PRIMITIVE_SPHERE, SURFACE_ORIENTED};
@@ -33,6 +34,10 @@ pub struct Vertex {
     pub tangent: DVec3,
     /// On a surface: the geometric normal, on the side of `axis`.
     pub normal: DVec3,
+    /// Where normals are turned by maps: the normal before that.
+    pub base: DVec3,
+    /// There: squared roughness by which light fades where it grazes the surface, or 0.
+    pub fade: f64,
 }
 
 /// The components of a direction in the local frame of a surface.
@@ -68,7 +73,13 @@ pub fn eval_scattering(tables: &Tables, vertex: &Vertex, direction: DVec3) -> Bs
     if !sides_agree(vertex, local.z, direction) {
         return BsdfValue::default();
     }
-    eval_bsdf(&vertex.surface, &tables.values, vertex.incident, local)
+    let found = eval_bsdf(&vertex.surface, &tables.values, vertex.incident, local);
+    BsdfValue { value: found.value * fading(vertex, direction), ..found }
+}
+
+/// What turned normals leave of light in a direction.
+fn fading(vertex: &Vertex, direction: DVec3) -> f64 {
+    if vertex.fade > 0.0 { relief_fading(vertex.fade, vertex.base.dot(direction)) } else { 1.0 }
 }
 
 /// A direction found by scattering, in world space.
@@ -90,7 +101,7 @@ pub fn sample_scattering(tables: &Tables, vertex: &Vertex, u: DVec2, lobe: f64) 
     if !sides_agree(vertex, found.direction.z, direction) {
         return BsdfSample { direction, weight: DVec3::ZERO, pdf: 0.0, ..found };
     }
-    BsdfSample { direction, ..found }
+    BsdfSample { direction, weight: found.weight * fading(vertex, direction), ..found }
 }
 
 /// Where a ray in some direction begins so that it does not meet the surface it leaves.

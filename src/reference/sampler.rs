@@ -9,7 +9,12 @@ pub fn set_key(seed: u32, pixel: u32, set: u32, index: u32) -> [u32; 4] {
     pcg4d([pixel, set, seed, if set < SOBOL_SETS { index >> POINT_BITS } else { index }])
 }
 
-/// Which of the table's points is next, for a set below [`SOBOL_SETS`].
+/// The random words of the set for a camera's lens: those of set 0 with other words for the seed.
+pub fn lens_key(seed: u32, pixel: u32, index: u32) -> [u32; 4] {
+    set_key(seed ^ 0x6c65_6e73, pixel, 0, index)
+}
+
+/// Which of the table's points is next, for a set below [`SOBOL_SETS`] or [`crate::pack::sobol::LENS_SET`].
 pub fn point_index(set: u32, index: u32, key: [u32; 4]) -> u32 {
     set * POINT_COUNT + ((index ^ (key[0] & 0xff) ^ (key[1] & 0xff) << 4) & (POINT_COUNT - 1))
 }

@@ -1,7 +1,7 @@
 //! Mirror of `shaders/lib/texture.glsl`: colours that depend on the place on a surface.
 
 use super::bindings::Texture;
-use crate::pack::layout::{TEXTURE_CHECKERBOARD, TEXTURE_CLAMP, TEXTURE_MIRROR, TEXTURE_NEAREST};
+use crate::pack::layout::{TEXTURE_BITMAP, TEXTURE_CHECKERBOARD, TEXTURE_CLAMP, TEXTURE_MIRROR, TEXTURE_NEAREST};
 use glam::{DVec2, DVec3};
 
 /// A coordinate moved to \[−1/2, 5/2\] without moving to another pixel.
@@ -49,4 +49,22 @@ pub fn eval_texture(texture: &Texture, values: &[f32], uv: DVec2) -> DVec3 {
     let upper = texture_pixel(texture, values, x, y).lerp(texture_pixel(texture, values, x + 1, y), share.x);
     let lower = texture_pixel(texture, values, x, y + 1).lerp(texture_pixel(texture, values, x + 1, y + 1), share.x);
     upper.lerp(lower, share.y)
+}
+
+/// The gradient of the first channel of an image with bilinear filter, with respect to (u, v); 0 for what is no image.
+pub fn texture_gradient(texture: &Texture, values: &[f32], uv: DVec2) -> DVec2 {
+    if texture.kind != TEXTURE_BITMAP {
+        return DVec2::ZERO;
+    }
+    let place = DVec2::new(texture.row_u.dot(uv.extend(1.0)), texture.row_v.dot(uv.extend(1.0)));
+    let place = DVec2::new(wrapped_coordinate(place.x, texture.flags), wrapped_coordinate(place.y, texture.flags));
+    let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
+    let place = place * size;
+    let low = (place - 0.5).floor();
+    let share = place - 0.5 - low;
+    let pixel = |x: i32, y: i32| texture_pixel(texture, values, low.x as i32 + x, low.y as i32 + y).x;
+    let [f00, f10, f01, f11] = [pixel(0, 0), pixel(1, 0), pixel(0, 1), pixel(1, 1)];
+    let mix = |a: f64, b: f64, share: f64| a + (b - a) * share;
+    let slope = DVec2::new(mix(f10 - f00, f11 - f01, share.y), mix(f01 - f00, f11 - f10, share.x)) * size;
+    texture.row_u.truncate() * slope.x + texture.row_v.truncate() * slope.y
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+pub mod aov;
 pub mod film;
 pub mod picture;
 pub mod scene_hash;

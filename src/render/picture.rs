@@ -9,7 +9,7 @@ use super::film::Film;
 use super::scene_hash::scene_hash;
 use super::session::{Outcome, Rendered};
 use crate::image::{Attribute, Image, Metadata, Window};
-use crate::scene::{self, Camera, Scene};
+use crate::scene::{self, Camera, Colors, Lens, Scene};
 
 /// The image of a render: `R G B`, `Variance.R Variance.G Variance.B` (the variance of the mean, see [`Film::variance`]),
 /// and `sampleCount`.
@@ -36,6 +36,39 @@ pub fn assemble(scene: &Scene, rendered: &Rendered, device: &DeviceInfo, seed: u
     image.push("sampleCount", vec![film.samples() as f32; film.pixels()]);
     image
 }
+
+/// The image as it is to be written: with further channels, which go before those of errors and counts where they belong to the
+/// colours (`A`), and in the colours of a format.
+pub fn finish(mut image: Image, colors: Colors, further: Vec<(String, Vec<f32>)>) -> Image {
+    let mut channels = std::mem::take(&mut image.channels);
+    let behind = channels.split_off(3);
+    // Taken as they are, so that a channel that is not finite leaves the others alone.
+    if colors == Colors::Rgb {
+        image.channels = channels;
+        further.into_iter().for_each(|(name, samples)| image.push(name, samples));
+        image.channels.extend(behind);
+        return image;
+    }
+    let rgb: Vec<Vec<f32>> = channels.into_iter().map(|channel| channel.samples).collect();
+    let mix = |row: DVec3| {
+        let mixed = |k: usize| row.dot(DVec3::from([0, 1, 2].map(|q: usize| f64::from(rgb[q][k])))) as f32;
+        (0..rgb[0].len()).map(mixed).collect::<Vec<f32>>()
+    };
+    let [x, y, z] = LINEAR_SRGB_TO_XYZ.map(DVec3::from);
+    let rows = if colors == Colors::Xyz { vec![("X", x), ("Y", y), ("Z", z)] } else { vec![("Y", y)] };
+    for (name, row) in rows {
+        image.push(name, mix(row));
+    }
+    for (name, samples) in further {
+        image.push(name, samples);
+    }
+    image.channels.extend(behind);
+    image
+}
+
+/// Rows of the matrix from linear sRGB to CIE XYZ, with the digits of Mitsuba 3.9.1's `srgb_to_xyz`.
+const LINEAR_SRGB_TO_XYZ: [[f64; 3]; 3] =
+    [[0.412_453, 0.357_580, 0.180_423], [0.212_671, 0.715_160, 0.072_169], [0.019_334, 0.119_193, 0.950_227]];
 
 fn metadata(
     scene: &Scene,
@@ -73,6 +106,7 @@ fn metadata(
         display: Window { x: 0, y: 0, width: whole.width as usize, height: whole.height as usize },
         world_to_camera: Some(row_vector_layout(world_to_camera(&scene.camera))),
         world_to_ndc: Some(row_vector_layout(world_to_ndc(&scene.camera, whole))),
+        half: whole.pixel_format.half,
         attributes: attributes.into_iter().map(|(name, value)| (format!("tyndall:{name}"), value)).collect(),
     }
 }
@@ -89,6 +123,12 @@ fn world_to_camera(camera: &Camera) -> DMat4 {
 /// the near plane to 1 on the far plane. Inverse of the camera's rays: the direction through (u, v) has x / z =
 /// 2 tan(fov/2) (u + offset − ½), and the same for y with the film's proportions.
 fn world_to_ndc(camera: &Camera, film: &scene::Film) -> DMat4 {
+    if let Lens::Orthographic { half_width, half_height } = camera.lens {
+        let depth = 1.0 / (camera.far_clip - camera.near_clip);
+        let scale = DMat4::from_scale(DVec3::new(0.5 / half_width, -0.5 / half_height, depth));
+        let center = DVec3::new(0.5, 0.5, -camera.near_clip * depth);
+        return DMat4::from_translation(center) * scale * world_to_camera(camera);
+    }
     let reciprocal_width = 0.5 / (0.5 * camera.fov_x).to_radians().tan();
     let proportion = f64::from(film.width) / f64::from(film.height);
     let center = 0.5 - camera.principal_point_offset;

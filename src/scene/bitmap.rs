@@ -1,4 +1,4 @@
-//! Images that a scene uses: pixels in linear sRGB, from PNG and OpenEXR files.
+//! Images that a scene uses: pixels in linear sRGB, from PNG, JPEG, OpenEXR and Radiance files.
 
 use std::fmt;
 use std::io::Cursor;
@@ -6,6 +6,7 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3, Vec3};
 
+use super::bitmap_formats as formats;
 use crate::image::{ImageError, exr};
 
 /// An image: rows from the top, pixels of a row from the left, three channels.
@@ -22,8 +23,8 @@ pub enum BitmapError {
     /// The file cannot be read.
     #[error("{0}")]
     Unreadable(#[from] std::io::Error),
-    /// Neither of the formats that are known.
-    #[error("it is neither a PNG nor an OpenEXR file")]
+    /// None of the formats that are known.
+    #[error("it is neither a PNG, a JPEG, an OpenEXR nor a Radiance (.hdr) file")]
     UnknownFormat,
     /// The file breaks the rules of its format.
     #[error("{0}")]
@@ -66,9 +67,10 @@ impl Bitmap {
         Ok(Bitmap { width: width as u32, height: height as u32, pixels })
     }
 
-    /// Reads a PNG (8 or 16 bits, gray or colour, with a palette or without) or an OpenEXR file. What is in a PNG is decoded
-    /// from sRGB (IEC 61966-2-1) to linear values unless it is `raw`, where codes from 0 to the largest become 0 to 1; OpenEXR
-    /// is linear already. Alpha is left out. Which of the two a file is shows in its first bytes, not in its name.
+    /// Reads a PNG (8 or 16 bits, gray or colour, with a palette or without), a JPEG, an OpenEXR or a Radiance file. What is in a
+    /// PNG or JPEG is decoded from sRGB (IEC 61966-2-1) to linear values unless it is `raw`, where codes from 0 to the largest
+    /// become 0 to 1; the others are linear already. Alpha is left out. Which of them a file is shows in its first bytes, not in
+    /// its name.
     pub fn read(path: &Path, raw: bool) -> Result<Bitmap, BitmapError> {
         let bytes = std::fs::read(path)?;
         if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
@@ -76,6 +78,10 @@ impl Bitmap {
         } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
             drop(bytes);
             read_exr(path)
+        } else if bytes.starts_with(&[0xff, 0xd8, 0xff]) {
+            formats::read_jpeg(&bytes, raw)
+        } else if bytes.starts_with(b"#?RADIANCE") || bytes.starts_with(b"#?RGBE") {
+            formats::read_rgbe(&bytes)
         } else {
             Err(BitmapError::UnknownFormat)
         }

@@ -113,6 +113,29 @@ pub enum Bsdf {
         /// Reflects on both sides; otherwise the back is black.
         two_sided: bool,
     },
+    /// Two models in one place: the second counts with the weight, the first with what is left of 1.
+    Blend {
+        /// In \[0, 1\], gray: its three channels are the same.
+        weight: Texture,
+        /// With the weight 0 all of it.
+        first: Box<Bsdf>,
+        /// With the weight 1 all of it.
+        second: Box<Bsdf>,
+    },
+    /// A surface whose sides differ: each of them is seen as if it were the front.
+    Sides {
+        /// On the side of the normals.
+        front: Box<Bsdf>,
+        /// On the other one.
+        back: Box<Bsdf>,
+    },
+    /// A surface whose normals are turned from place to place.
+    Relief {
+        /// How.
+        relief: Relief,
+        /// What is seen in the turned frame.
+        nested: Box<Bsdf>,
+    },
     /// A surface with holes: light meets `nested` with the probability `opacity` and goes straight on otherwise.
     Mask {
         /// In \[0, 1\], gray: its three channels are the same.
@@ -120,6 +143,28 @@ pub enum Bsdf {
         /// What is there where there is no hole.
         nested: Box<Bsdf>,
     },
+}
+
+/// How normals are turned, relative to the frame of the interpolated normal n, of s along the direction in which u grows, and t = n × s.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Relief {
+    /// The turned normals, or heights.
+    pub map: ReliefMap,
+    /// A normal that the viewer would see from behind is turned to the other side of n instead (Schüssler et al. 2017).
+    pub flips: bool,
+    /// Light that would end abruptly where it grazes the surface itself fades out (Conty Estevez, Lecocq and Stein 2019).
+    pub fades: bool,
+    /// The model inside has two equal sides of its own, so that its back is turned with the front rather than mirrored.
+    pub around_two_sides: bool,
+}
+
+/// Where turned normals come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReliefMap {
+    /// 2 · colour − 1 is the normal in (s, t, n), not normalised.
+    Normals(Texture),
+    /// A gray image of heights above the surface, scene units, times a factor; what counts is their slope.
+    Heights(Texture, f64),
 }
 
 /// Distribution of microfacet normals.
@@ -163,6 +208,10 @@ impl Bsdf {
             Bsdf::Plastic { .. } => "plastic",
             Bsdf::RoughPlastic { .. } => "roughplastic",
             Bsdf::Mask { .. } => "mask",
+            Bsdf::Blend { .. } => "blendbsdf",
+            Bsdf::Sides { .. } => "twosided",
+            Bsdf::Relief { relief: Relief { map: ReliefMap::Normals(_), .. }, .. } => "normalmap",
+            Bsdf::Relief { .. } => "bumpmap",
         }
     }
 
@@ -176,7 +225,9 @@ impl Bsdf {
             | Bsdf::Plastic { two_sided, .. }
             | Bsdf::RoughPlastic { two_sided, .. } => !two_sided,
             Bsdf::Dielectric { .. } | Bsdf::RoughDielectric { .. } => true,
-            Bsdf::Mask { nested, .. } => nested.sides_differ(),
+            Bsdf::Mask { nested, .. } | Bsdf::Relief { nested, .. } => nested.sides_differ(),
+            Bsdf::Blend { first, second, .. } => first.sides_differ() || second.sides_differ(),
+            Bsdf::Sides { .. } => true,
         }
     }
 
@@ -188,6 +239,11 @@ impl Bsdf {
             | Bsdf::RoughConductor { two_sided, .. }
             | Bsdf::Plastic { two_sided, .. }
             | Bsdf::RoughPlastic { two_sided, .. } => *two_sided = true,
+            Bsdf::Blend { first, second, .. } => {
+                **first = (**first).clone().two_sided()?;
+                **second = (**second).clone().two_sided()?;
+            }
+            Bsdf::Relief { nested, .. } => **nested = (**nested).clone().two_sided()?,
             _ => return None,
         }
         Some(self)
@@ -210,11 +266,13 @@ impl Bsdf {
             | Bsdf::RoughPlastic { diffuse_reflectance, specular_reflectance, .. } => {
                 vec![diffuse_reflectance, specular_reflectance]
             }
-            Bsdf::Mask { opacity, nested } => {
-                let mut all = nested.textures();
-                all.push(opacity);
-                all
-            }
+            Bsdf::Mask { opacity, nested } => [nested.textures(), vec![opacity]].concat(),
+            Bsdf::Blend { weight, first, second } => [first.textures(), second.textures(), vec![weight]].concat(),
+            Bsdf::Sides { front, back } => [front.textures(), back.textures()].concat(),
+            Bsdf::Relief {
+                relief: Relief { map: ReliefMap::Normals(map) | ReliefMap::Heights(map, _), .. },
+                nested,
+            } => [nested.textures(), vec![map]].concat(),
         }
     }
 
@@ -225,6 +283,12 @@ impl Bsdf {
                 roughness.is_anisotropic()
             }
             Bsdf::Mask { nested, .. } if nested.needs_uvs().is_some() => return nested.needs_uvs(),
+            Bsdf::Blend { first, second, .. } | Bsdf::Sides { front: first, back: second }
+                if first.needs_uvs().or(second.needs_uvs()).is_some() =>
+            {
+                return first.needs_uvs().or(second.needs_uvs());
+            }
+            Bsdf::Relief { .. } => return Some("a map of normals or heights"),
             _ => false,
         };
         if self.textures().iter().any(|texture| texture.constant().is_none()) {

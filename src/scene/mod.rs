@@ -19,18 +19,23 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec2, DVec3};
 
 pub mod bitmap;
+mod bitmap_formats;
 mod bsdf;
 pub mod check;
 mod error;
+mod filter;
 pub mod mesh;
 pub mod mitsuba;
+mod output;
 mod phase;
 pub mod spectrum;
 mod texture;
 
 pub use bitmap::Bitmap;
-pub use bsdf::{Bsdf, Distribution, Roughness};
+pub use bsdf::{Bsdf, Distribution, Relief, ReliefMap, Roughness};
 pub use error::SceneError;
+pub use filter::ReconstructionFilter;
+pub use output::{Aov, AovKind, Colors, PixelFormat};
 pub use phase::Phase;
 pub use texture::{Filter, Texture, Wrap};
 
@@ -53,6 +58,8 @@ pub struct Scene {
     pub media: Vec<Medium>,
     /// Light sources that are not shapes.
     pub lights: Vec<Light>,
+    /// Channels that are written beside the radiance.
+    pub aovs: Vec<Aov>,
     /// Samples a pixel that the scene asks for; the command line may ask for others.
     pub sample_count: u32,
 }
@@ -67,6 +74,7 @@ impl Scene {
             shapes: Vec::new(),
             media: Vec::new(),
             lights: Vec::new(),
+            aovs: Vec::new(),
             sample_count: 16,
         }
     }
@@ -83,7 +91,28 @@ impl Scene {
     }
 }
 
-/// A pinhole camera with Mitsuba's conventions: camera space looks along +z, with +y up and +x to the *left*.
+/// How rays leave a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lens {
+    /// All through one point.
+    Pinhole,
+    /// From a disk about that point, so that what is not at one distance is blurred.
+    Thin {
+        /// Radius of the disk, scene units, > 0.
+        aperture_radius: f64,
+        /// Distance of the plane in focus from the camera along the optical axis, scene units, > 0.
+        focus_distance: f64,
+    },
+    /// All in the same direction, from a rectangle. The camera's field of view has no meaning.
+    Orthographic {
+        /// Half the width of the rectangle that the whole film sees, scene units.
+        half_width: f64,
+        /// Half its height, scene units.
+        half_height: f64,
+    },
+}
+
+/// A camera with Mitsuba's conventions: camera space looks along +z, with +y up and +x to the *left*.
 #[derive(Clone, Debug)]
 pub struct Camera {
     /// Camera space to world space, a rigid motion (a uniform scale is tolerated; it does not change the picture).
@@ -96,6 +125,8 @@ pub struct Camera {
     pub far_clip: f64,
     /// Shift of the principal point, as a fraction of the film's size.
     pub principal_point_offset: DVec2,
+    /// How rays leave the camera.
+    pub lens: Lens,
     /// The scene-wide medium: what fills the space that no boundary encloses. `None` is vacuum.
     pub medium: Option<MediumId>,
 }
@@ -109,6 +140,7 @@ impl Camera {
             near_clip: 1e-2,
             far_clip: 1e4,
             principal_point_offset: DVec2::ZERO,
+            lens: Lens::Pinhole,
             medium: None,
         }
     }
@@ -122,8 +154,8 @@ pub fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> DMat4 {
     DMat4::from_cols(left.extend(0.0), true_up.extend(0.0), forward.extend(0.0), origin.extend(1.0))
 }
 
-/// The film: `width × height` pixels, of which the crop window is rendered. The filter is a box of one pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The film: `width × height` pixels, of which the crop window is rendered.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Film {
     /// Pixels in a row of the whole film.
     pub width: u32,
@@ -131,6 +163,13 @@ pub struct Film {
     pub height: u32,
     /// The part that is rendered and written.
     pub crop: Crop,
+    /// How the samples about a pixel make up its value.
+    pub filter: ReconstructionFilter,
+    /// Where the samples of a filter that is wider than a pixel may lie: at the edges of this part of the film the filter is
+    /// cut off, and what is left of it normalised. `None` lets samples lie beyond the edges of the film.
+    pub sample_area: Option<Crop>,
+    /// How the pixels are written.
+    pub pixel_format: PixelFormat,
 }
 
 impl Film {
@@ -140,9 +179,17 @@ impl Film {
     /// Most pixels in a crop window. One block of samples holds 24 bytes a pixel, 6.4 GB at this limit.
     pub const MAX_PIXELS: u64 = 1 << 28;
 
-    /// A film that is rendered whole.
+    /// A film that is rendered whole, with a box filter of one pixel.
     pub fn new(width: u32, height: u32) -> Self {
-        Film { width, height, crop: Crop { x: 0, y: 0, width, height } }
+        let crop = Crop { x: 0, y: 0, width, height };
+        Film {
+            width,
+            height,
+            crop,
+            filter: ReconstructionFilter::PIXEL,
+            sample_area: Some(crop),
+            pixel_format: PixelFormat::default(),
+        }
     }
 }
 

@@ -75,6 +75,11 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "equiangular angle", relative: 1e-6, absolute: 0.0 },
     Tolerance { function: "equiangular rank", relative: 0.0, absolute: 2e-6 },
     Tolerance { function: "equiangular_pdf", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "lens_point", relative: 0.0, absolute: 2e-6 },
+    Tolerance { function: "focused_direction", relative: 0.0, absolute: 2e-6 },
+    Tolerance { function: "sample_filter rank", relative: 0.0, absolute: 8e-7 },
+    Tolerance { function: "sample_filter weight", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "filter_pdf", relative: 2e-6, absolute: 1e-5 },
     Tolerance { function: "camera_direction", relative: 3e-7, absolute: 0.0 },
 ];
 

@@ -293,7 +293,38 @@ fn materials_and_media() {
         ("‸<bsdf type=\"roughdielectrik\" id=\"b\"/>", &["did you mean \"roughdielectric\"?"]),
         ("<bsdf type=\"twosided\">‸<bsdf type=\"null\"/></bsdf>", &["cannot hold <bsdf type=\"null\">"]),
         ("‸<bsdf type=\"twosided\"/>", &["holds 0 BSDFs"]),
-        ("‸<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>", &["holds 2 BSDFs"]),
+        (
+            "‸<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>",
+            &["holds 3 BSDFs"],
+        ),
+        ("‸<bsdf type=\"blendbsdf\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>", &["needs a weight"]),
+        (
+            "‸<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.5\"/><bsdf type=\"diffuse\"/></bsdf>",
+            &["holds 1 BSDFs; it must hold two"],
+        ),
+        (
+            "<bsdf type=\"blendbsdf\">‸<float name=\"weight\" value=\"1.5\"/><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>",
+            &["between 0 and 1"],
+        ),
+        (
+            "<bsdf type=\"blendbsdf\" id=\"a\"><float name=\"weight\" value=\"0.5\"/>‸<ref id=\"a\"/><ref id=\"a\"/></bsdf>",
+            &["is inside of itself"],
+        ),
+        ("<bsdf type=\"mask\" id=\"a\">‸<ref id=\"a\"/></bsdf>", &["is inside of itself"]),
+        ("‸<bsdf type=\"normalmap\"><bsdf type=\"diffuse\"/></bsdf>", &["needs <texture name=\"normalmap\""]),
+        ("‸<bsdf type=\"bumpmap\"><bsdf type=\"diffuse\"/></bsdf>", &["holds 0 textures; it must hold one"]),
+        (
+            "<bsdf type=\"bumpmap\">‸<texture type=\"checkerboard\"/><bsdf type=\"diffuse\"/></bsdf>",
+            &["must change smoothly"],
+        ),
+        (
+            "<bsdf type=\"normalmap\"><rgb name=\"normalmap\" value=\"0.5, 0.5, 1\"/>‸<bsdf type=\"null\"/></bsdf>",
+            &["cannot hold <bsdf type=\"null\">"],
+        ),
+        (
+            "<bsdf type=\"twosided\">‸<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.5\"/><bsdf type=\"dielectric\"/><bsdf type=\"diffuse\"/></bsdf></bsdf>",
+            &["lets light through"],
+        ),
         ("<bsdf type=\"diffuse\">‸<rgb name=\"reflectance\" value=\"1.5\"/></bsdf>", &["between 0 and 1"]),
         ("<bsdf type=\"null\">‸<rgb name=\"reflectance\" value=\"1\"/></bsdf>", &["accepted: nothing"]),
     ]);
@@ -364,10 +395,34 @@ fn sensors() {
             &["does not lie"],
         ),
         (film("‸<rfilter type=\"bx\"/>"), &["did you mean \"box\"?"]),
+        (film("<rfilter type=\"tent\">‸<float name=\"radius\" value=\"0\"/></rfilter>"), &["greater than 0"]),
+        (film("<rfilter type=\"tent\">‸<float name=\"stddev\" value=\"1\"/></rfilter>"), &["no property \"stddev\""]),
+        (film("<rfilter type=\"lanczos\">‸<integer name=\"lobes\" value=\"99\"/></rfilter>"), &["between 1 and"]),
+        (film("<rfilter type=\"mitchell\">‸<float name=\"B\" value=\"9\"/></rfilter>"), &["between -1 and 1"]),
+        (film("‸<string name=\"pixel_format\" value=\"cmyk\"/>"), &["accepted: rgb, rgba"]),
+        (film("‸<string name=\"component_format\" value=\"uint32\"/>"), &["accepted: float32, float16"]),
+        (film("‸<string name=\"file_format\" value=\"pfm\"/>"), &["accepted: openexr"]),
     ] {
         refused(&sensor(&inside), parts).unwrap_or_else(|failure| panic!("{failure}"));
     }
-    let empty = "<scene version=\"3.0.0\">\n‸<sensor type=\"perspective\"/></scene>";
-    refused(empty, &["neither fov nor focal_length", "50mm"]).unwrap();
-    refused("<scene version=\"3.0.0\">‸<sensor type=\"thinlens\"/></scene>", &["accepted types: perspective"]).unwrap();
+    refused("<scene version=\"3.0.0\">‸<sensor type=\"distant\"/></scene>", &["accepted types: perspective"]).unwrap();
+    let of = |plugin: &str, inside: &str| {
+        format!("<scene version=\"3.0.0\"><sensor type=\"{plugin}\">{inside}</sensor></scene>")
+    };
+    let lens = |inside: &str| of("thinlens", &format!("{fov}{inside}"));
+    for (text, parts) in [
+        (lens("‸<float name=\"aperture_radius\" value=\"0\"/>"), &["greater than 0"][..]),
+        (
+            lens("<float name=\"aperture_radius\" value=\"1\"/>‸<float name=\"focus_distance\" value=\"-1\"/>"),
+            &["greater than 0"],
+        ),
+        (
+            of("orthographic", "‸<transform name=\"to_world\"><matrix value=\"1 1 0 0 1 0 0 0 1\"/></transform>"),
+            &["shears"],
+        ),
+        (of("orthographic", "‸<transform name=\"to_world\"><scale value=\"0\"/></transform>"), &["no inverse"]),
+        (of("orthographic", "‸<float name=\"fov\" value=\"1\"/>"), &["no property \"fov\""]),
+    ] {
+        refused(&text, parts).unwrap_or_else(|failure| panic!("{failure}"));
+    }
 }

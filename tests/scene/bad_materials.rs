@@ -77,7 +77,7 @@ fn textures() {
     };
     for (file, parts) in [
         ("textures/none.png", &["cannot read the image ", "none.png: ", "No such file"][..]),
-        ("textures/text.png", &["text.png: it is neither a PNG nor an OpenEXR file"]),
+        ("textures/text.png", &["text.png: it is neither a PNG, a JPEG, an OpenEXR nor"]),
         ("textures/broken.png", &["cannot read the image ", "broken.png: "]),
         ("textures/nan.exr", &["nan.exr: pixel (5, 2) is not finite"]),
         (

@@ -57,6 +57,12 @@ fn every_property_is_documented() {
             r#"<sensor type="perspective"><float name="fov" value="1"/>‸</sensor>"#,
             &[][..],
         ),
+        (
+            "### `<sensor type=\"thinlens\">`",
+            r#"<sensor type="thinlens"><float name="fov" value="1"/><float name="aperture_radius" value="1"/>‸</sensor>"#,
+            &[],
+        ),
+        ("### `<sensor type=\"orthographic\">`", r#"<sensor type="orthographic">‸</sensor>"#, &[]),
         ("### `<film type=\"hdrfilm\">`", film, &[]),
         ("### `<sampler type=\"independent\">`", sampler, &[]),
         ("### `<integrator type=\"volpath\">`", r#"<integrator type="volpathmis">‸</integrator>"#, &[]),
@@ -92,6 +98,17 @@ fn every_property_is_documented() {
         ("### `<bsdf type=\"plastic\">`", r#"<bsdf type="plastic">‸</bsdf>"#, &[]),
         ("### `<bsdf type=\"roughplastic\">`", r#"<bsdf type="roughplastic">‸</bsdf>"#, &[]),
         ("### `<bsdf type=\"mask\">`", r#"<bsdf type="mask"><bsdf type="null"/>‸</bsdf>"#, &[]),
+        (
+            "### `<bsdf type=\"blendbsdf\">`",
+            r#"<bsdf type="blendbsdf"><float name="weight" value="0"/><bsdf type="diffuse"/><bsdf type="diffuse"/>‸</bsdf>"#,
+            &[],
+        ),
+        (
+            "### `<bsdf type=\"normalmap\">`",
+            r#"<bsdf type="normalmap"><rgb name="normalmap" value="0.5, 0.5, 1"/><bsdf type="diffuse"/>‸</bsdf>"#,
+            &[],
+        ),
+        ("### `<bsdf type=\"bumpmap\">`", &example("bsdf", "bumpmap"), &[]),
         ("### `<texture type=\"bitmap\">`", bitmap, &[]),
         ("### `<texture type=\"checkerboard\">`", r#"<texture type="checkerboard">‸</texture>"#, &[]),
         ("### `<emitter type=\"spot\">`", r#"<emitter type="spot">‸</emitter>"#, &[]),
@@ -117,13 +134,26 @@ fn example(tag: &str, kind: &str) -> String {
     let string = |name: &str, value: &str| format!(r#"<string name="{name}" value="{value}"/>"#);
     let inside = match (tag, kind) {
         ("integrator", "moment" | "aov") => r#"<integrator type="path"/>"#.to_owned(),
-        ("sensor", _) => r#"<float name="fov" value="1"/>"#.to_owned(),
+        ("sensor", "perspective") => r#"<float name="fov" value="1"/>"#.to_owned(),
+        ("sensor", "thinlens") => {
+            r#"<float name="fov" value="1"/><float name="aperture_radius" value="1"/>"#.to_owned()
+        }
         ("phase", "blendphase") => r#"<float name="weight" value="0"/><phase type="hg"/><phase type="hg"/>"#.to_owned(),
         ("phase", "tabphase") => string("values", "1 1"),
         ("shape", "obj") => string("filename", "meshes/ball.obj"),
         ("shape", "ply" | "serialized") => string("filename", &format!("meshes/triangle.{kind}")),
         ("shape", "instance") => r#"<shape type="shapegroup"/>"#.to_owned(),
         ("bsdf", "mask" | "twosided") => r#"<bsdf type="diffuse"/>"#.to_owned(),
+        ("bsdf", "blendbsdf") => {
+            r#"<float name="weight" value="0"/><bsdf type="diffuse"/><bsdf type="diffuse"/>"#.to_owned()
+        }
+        ("bsdf", "normalmap") => r#"<rgb name="normalmap" value="0.5, 0.5, 1"/><bsdf type="diffuse"/>"#.to_owned(),
+        ("bsdf", "bumpmap") => {
+            format!(
+                r#"<texture type="bitmap">{}</texture><bsdf type="diffuse"/>"#,
+                string("filename", "textures/gray.png")
+            )
+        }
         ("texture", "bitmap") => string("filename", "textures/colors.png"),
         ("emitter", "envmap") => string("filename", "textures/sky.exr"),
         ("spectrum", "blackbody") => r#"<float name="temperature" value="1"/>"#.to_owned(),

@@ -120,7 +120,7 @@ fn integrators_around_others() {
     let inner = r#"<integrator type="path"><integer name="max_depth" value="5"/></integrator>"#;
     assert_eq!(integrator(&format!(r#"<integrator type="moment">{inner}</integrator>"#)).max_depth, Some(5));
     let aov = format!(r#"<integrator type="aov"><string name="aovs" value="d:depth"/>{inner}</integrator>"#);
-    assert!(warning(&aov).ends_with("the channels \"d:depth\" are not written"));
+    assert_eq!(scene(&aov).aovs, [Aov { name: "d".to_owned(), kind: AovKind::Depth }]);
     let error = |body: &str| {
         let text = format!("<scene version=\"3.0.0\">{}{}{body}</scene>", crate::SENSOR, crate::LIGHT);
         crate::parse(&text).unwrap_err().to_string()
@@ -133,6 +133,15 @@ fn integrators_around_others() {
     ] {
         let text = error(&format!(r#"<integrator type="moment" id="outer">{inside}</integrator>"#));
         assert!(text.contains(message), "{inside}: {text}");
+    }
+    for (aovs, message) in [
+        ("d:dephth", "aovs has \"d:dephth\"; accepted: pairs name:type"),
+        ("depth", "aovs has \"depth\""),
+        ("d:depth,d:uv", "needs a name of its own for each; \"d\" is not"),
+        (":depth", "needs a name of its own"),
+    ] {
+        let text = error(&aov.replace("d:depth", aovs));
+        assert!(text.contains(message), "{aovs}: {text}");
     }
     let samples = r#"<integer name="emitter_samples" value="4"/><integer name="bsdf_samples" value="2"/>"#;
     assert_eq!(integrator(&format!(r#"<integrator type="direct">{samples}</integrator>"#)).max_depth, Some(2));

@@ -52,6 +52,9 @@ fn fields_of_view() {
         let got = sensor(&format!(r#"<string name="focal_length" value="{text}"/>{wide}"#)).camera.fov_x;
         assert!((got - 38.18484115600586).abs() < 1e-5, "{text}: {got}");
     }
+    // Where nothing is said, 50 mm.
+    let got = sensor(&wide).camera.fov_x;
+    assert!((got - 38.18484115600586).abs() < 1e-5, "by default: {got}");
     // The crop window does not change the field of view.
     let crop = r#"<integer name="width" value="768"/><integer name="height" value="576"/><integer name="crop_width" value="10"/>"#;
     assert!((fov("y", &film(crop)) - 51.774009704589844).abs() < 1e-5);
@@ -67,10 +70,28 @@ fn films() {
     assert_eq!(film_of(inside), Film::new(30, 20));
     let crop = r#"<integer name="crop_offset_x" value="5"/><integer name="crop_offset_y" value="6"/>
         <integer name="crop_width" value="7"/><integer name="crop_height" value="14"/>"#;
-    assert_eq!(
-        film_of(&format!("{inside}{crop}")),
-        Film { width: 30, height: 20, crop: Crop { x: 5, y: 6, width: 7, height: 14 } }
-    );
+    let window = Crop { x: 5, y: 6, width: 7, height: 14 };
+    let expected = Film { crop: window, sample_area: Some(window), ..Film::new(30, 20) };
+    assert_eq!(film_of(&format!("{inside}{crop}")), expected);
+    let beyond = r#"<boolean name="sample_border" value="true"/>"#;
+    assert_eq!(film_of(&format!("{inside}{crop}{beyond}")), Film { sample_area: None, ..expected });
+    let format = |text: &str, component: &str| {
+        let both = format!(
+            r#"<string name="pixel_format" value="{text}"/><string name="component_format" value="{component}"/>"#
+        );
+        film_of(&both).pixel_format
+    };
+    for (text, colors, alpha) in [
+        ("rgb", Colors::Rgb, false),
+        ("RGBA", Colors::Rgb, true),
+        ("xyz", Colors::Xyz, false),
+        ("xyza", Colors::Xyz, true),
+        ("luminance", Colors::Luminance, false),
+        ("luminance_alpha", Colors::Luminance, true),
+    ] {
+        assert_eq!(format(text, "float32"), PixelFormat { colors, alpha, half: false });
+        assert_eq!(format(text, "float16"), PixelFormat { colors, alpha, half: true });
+    }
     // A film beyond the limit may be rendered in parts.
     let part = r#"<integer name="width" value="60000"/><integer name="height" value="60000"/>
         <integer name="crop_width" value="100"/><integer name="crop_height" value="100"/>"#;
@@ -80,18 +101,28 @@ fn films() {
 #[test]
 fn film_warnings() {
     let fov = r#"<float name="fov" value="40"/>"#;
-    for (inside, text) in [
-        ("", "no film"),
-        (r#"<film type="hdrfilm"/>"#, "Mitsuba's default is \"gaussian\""),
-        (r#"<film type="hdrfilm"><rfilter type="tent"/></film>"#, "not \"tent\""),
-        (
-            r#"<film type="hdrfilm"><rfilter type="box"/><string name="pixel_format" value="luminance"/></film>"#,
-            "not as \"luminance\"",
-        ),
-    ] {
-        let warnings = load(&format!("{fov}{inside}")).warnings;
-        assert!(warnings.len() == 1 && warnings[0].contains(text), "{inside}: {warnings:?}");
-    }
+    let warnings = load(fov).warnings;
+    assert!(warnings.len() == 1 && warnings[0].contains("no film"), "{warnings:?}");
+}
+
+#[test]
+fn filters() {
+    let filter = |inside: &str| {
+        sensor(&format!(r#"<float name="fov" value="40"/><film type="hdrfilm">{inside}</film>"#)).film.filter
+    };
+    let float = |name: &str, value: f64| format!(r#"<float name="{name}" value="{value}"/>"#);
+    let of = |plugin: &str, inside: &str| filter(&format!(r#"<rfilter type="{plugin}">{inside}</rfilter>"#));
+    assert_eq!(filter(""), ReconstructionFilter::Gaussian { stddev: 0.5 }, "Mitsuba's default");
+    assert_eq!(of("box", ""), ReconstructionFilter::PIXEL);
+    assert_eq!(of("box", &float("radius", 1.5)), ReconstructionFilter::Box { radius: 1.5 });
+    assert_eq!(of("tent", ""), ReconstructionFilter::Tent { radius: 1.0 });
+    assert_eq!(of("gaussian", &float("stddev", 0.75)), ReconstructionFilter::Gaussian { stddev: 0.75 });
+    assert_eq!(of("mitchell", ""), ReconstructionFilter::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 });
+    assert_eq!(of("mitchell", &float("B", 0.25)), ReconstructionFilter::Mitchell { b: 0.25, c: 1.0 / 3.0 });
+    assert_eq!(of("catmullrom", ""), ReconstructionFilter::Mitchell { b: 0.0, c: 0.5 });
+    assert_eq!(of("lanczos", ""), ReconstructionFilter::Lanczos { lobes: 3.0 });
+    let two = r#"<integer name="lobes" value="2"/>"#;
+    assert_eq!(of("lanczos", two), ReconstructionFilter::Lanczos { lobes: 2.0 });
 }
 
 #[test]

@@ -53,6 +53,31 @@ fn openexr_files() {
 }
 
 #[test]
+fn jpeg_files() {
+    let bitmap = Bitmap::read(&image("colors.jpg"), true).unwrap();
+    assert_eq!((bitmap.width(), bitmap.height()), (16, 8));
+    // As Mitsuba 3.9.1 reads them; decoders may differ by a code or two.
+    for ((x, y), expected) in
+        [((0, 0), [0.0, 5.0, 236.0]), ((5, 3), [80.0, 96.0, 191.0]), ((15, 7), [243.0, 218.0, 100.0])]
+    {
+        let got = bitmap.pixel(x, y).to_array().map(|value| 255.0 * f64::from(value));
+        let far = |wanted: [f64; 3]| got.iter().zip(wanted).any(|(got, wanted)| (got - wanted).abs() > 3.0);
+        assert!(!far(expected) && far(expected.map(|code| code + 8.0)), "({x}, {y}) is {got:?}");
+    }
+    let decoded = pixel("colors.jpg", false, 5, 3)[1];
+    let code = f64::from(pixel("colors.jpg", true, 5, 3)[1]);
+    assert!((f64::from(decoded) - bitmap::srgb_to_linear(code)).abs() < 1e-6);
+}
+
+#[test]
+fn radiance_files() {
+    // As Mitsuba 3.9.1, which wrote it, reads it.
+    assert_eq!(pixel("sky.hdr", false, 3, 0), [1.609_375, 1.25, 2.046_875]);
+    assert_eq!(pixel("sky.hdr", false, 5, 2), [5.0, 2.781_25, 2.0625]);
+    assert_eq!(pixel("sky.hdr", true, 15, 3), [2.765_625, 0.781_25, 0.1875]);
+}
+
+#[test]
 fn bitmaps_are_checked() {
     assert!(matches!(Bitmap::new(0, 4, vec![]), Err(bitmap::BitmapError::Size { width: 0, height: 4 })));
     assert!(matches!(Bitmap::new(usize::MAX, 2, vec![]), Err(bitmap::BitmapError::Size { .. })));

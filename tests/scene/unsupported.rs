@@ -18,6 +18,19 @@ fn nothing_is_left_out_silently() {
     let inside = r#"<bsdf type="diffuse"/>"#;
     let masked = format!(r#"<bsdf type="mask">{inside}</bsdf>"#);
     assert_eq!(refusal(&shape(&masked)), None);
+    let two = |first: &str, second: &str| {
+        format!(r#"<bsdf type="blendbsdf"><float name="weight" value="0.5"/>{first}{second}</bsdf>"#)
+    };
+    let nested = two(inside, &two(inside, inside));
+    assert_eq!(refusal(&shape(&nested)), None);
+    assert_eq!(
+        refusal(&shape(&two(&nested, &nested))).unwrap(),
+        "the BSDF of two parts each of which has several parts of \"thing\" cannot be rendered yet"
+    );
+    assert_eq!(
+        refusal(&shape(&two(&masked, inside))).unwrap(),
+        "the mask or null inside of a BSDF of two parts of \"thing\" cannot be rendered yet"
+    );
     let twice = format!(r#"<bsdf type="mask">{masked}</bsdf>"#);
     assert_eq!(refusal(&shape(&twice)).unwrap(), "the mask inside of a mask of \"thing\" cannot be rendered yet");
     for plugin in

@@ -4,13 +4,13 @@ use glam::DVec3;
 
 use super::build::Context;
 use super::material::{self, AIR, BK7, POLYPROPYLENE};
-use super::props::{Child, Given, NumberOrName, Props, unknown_plugin};
+use super::props::{Child, Colored, Given, NumberOrName, Props, unknown_plugin};
 use super::suggest::{did_you_mean, list};
-use super::texture::{choice, fraction, gray_fraction};
+use super::texture::{self, choice, fraction, gray, gray_fraction};
 use super::tree::Kind;
-use crate::scene::{Bsdf, Distribution, Roughness, SceneError};
+use crate::scene::{Bsdf, Distribution, Filter, Relief, ReliefMap, Roughness, SceneError, Texture};
 
-pub(super) const TYPES: [&str; 11] = [
+pub(super) const TYPES: [&str; 14] = [
     "diffuse",
     "null",
     "twosided",
@@ -22,10 +22,14 @@ pub(super) const TYPES: [&str; 11] = [
     "plastic",
     "roughplastic",
     "mask",
+    "blendbsdf",
+    "normalmap",
+    "bumpmap",
 ];
 
 /// What `twosided` can hold.
-const ONE_SIDED: [&str; 5] = ["diffuse", "conductor", "roughconductor", "plastic", "roughplastic"];
+const ONE_SIDED: [&str; 8] =
+    ["diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "blendbsdf", "normalmap", "bumpmap"];
 
 /// What Mitsuba gives to a shape without a BSDF, and the reflectance of a `diffuse` that does not say.
 pub(super) const DEFAULT_REFLECTANCE: f64 = 0.5;
@@ -35,6 +39,17 @@ const DEFAULT_ALPHA: f64 = 0.1;
 
 /// A BSDF.
 pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Bsdf, SceneError> {
+    // By a <ref>, one could hold itself.
+    if context.open_bsdfs.contains(&child.id) {
+        return Err(child.at.error(format!("{} is inside of itself", child.object.describe())));
+    }
+    context.open_bsdfs.push(child.id);
+    let bsdf = plugin(context, child);
+    context.open_bsdfs.pop();
+    bsdf
+}
+
+fn plugin<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Bsdf, SceneError> {
     let props = context.props(child);
     let factor = |context: &mut Context<'a>, name| fraction(context, &props, name, 1.0);
     let bsdf = match child.object.plugin.as_str() {
@@ -107,14 +122,112 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
             let nested = only_child(child, &props)?;
             Bsdf::Mask { opacity, nested: Box::new(convert(context, nested)?) }
         }
+        "blendbsdf" => blend(context, child, &props)?,
+        "normalmap" => {
+            let map = named_texture(context, child, &props, "normalmap")?;
+            relief(context, child, &props, ReliefMap::Normals(map))?
+        }
+        "bumpmap" => {
+            let scale = props.float("scale")?.map_or(1.0, |given| given.value);
+            let inside = props.children(Kind::Texture);
+            let [texture] = inside[..] else {
+                let (what, count) = (child.object.describe(), inside.len());
+                return Err(child.object.at.error(format!("{what} holds {count} textures; it must hold one")));
+            };
+            let map = gray(texture::convert(context, texture)?);
+            if let Texture::Bitmap { filter: Filter::Nearest, .. } | Texture::Checkerboard { .. } = map {
+                return Err(texture.at.error(
+                    "heights must change smoothly to have a slope; use a \"bitmap\" with the filter_type \"bilinear\"",
+                ));
+            }
+            relief(context, child, &props, ReliefMap::Heights(map, scale))?
+        }
         _ => return Err(unknown_plugin(child.object, &TYPES)),
     };
     props.finish()?;
     Ok(bsdf)
 }
 
-fn two_sided<'a>(context: &mut Context<'a>, child: Child<'a>, props: &Props<'a>) -> Result<Bsdf, SceneError> {
+/// Two BSDFs, weighted. Where one of them is `null` it is a mask.
+fn blend<'a>(context: &mut Context<'a>, child: Child<'a>, props: &Props<'a>) -> Result<Bsdf, SceneError> {
+    if !props.has("weight") {
+        let what = child.object.describe();
+        return Err(child.object.at.error(format!("{what} needs a weight, a <float> or <texture>")));
+    }
+    let weight = gray_fraction(context, props, "weight", 0.5)?;
+    let inside = props.children(Kind::Bsdf);
+    let [first, second] = inside[..] else {
+        let (what, count) = (child.object.describe(), inside.len());
+        return Err(child.object.at.error(format!("{what} holds {count} BSDFs; it must hold two")));
+    };
+    let (first, second) = (convert(context, first)?, convert(context, second)?);
+    let mask = |opacity, nested| Ok(Bsdf::Mask { opacity, nested: Box::new(nested) });
+    match (first, second) {
+        (Bsdf::Null, second) => mask(weight, second),
+        (first, Bsdf::Null) => match weight.constant() {
+            Some(weight) => mask((DVec3::ONE - weight).into(), first),
+            None => Err(child
+                .object
+                .at
+                .error("a blend whose second BSDF is \"null\" needs a constant weight; let \"null\" be the first, or use \"mask\"")),
+        },
+        (first, second) => Ok(Bsdf::Blend { weight, first: Box::new(first), second: Box::new(second) }),
+    }
+}
+
+/// The texture of a property that must be one.
+fn named_texture<'a>(
+    context: &mut Context<'a>,
+    child: Child<'a>,
+    props: &Props<'a>,
+    name: &'static str,
+) -> Result<Texture, SceneError> {
+    match props.color_or_texture(name)? {
+        Some(Colored::Texture(texture)) => texture::convert(context, texture),
+        Some(Colored::Constant(given)) => Ok(given.value.into()),
+        None => {
+            let what = child.object.describe();
+            Err(child.object.at.error(format!("{what} needs <texture name=\"{name}\" type=\"bitmap\">")))
+        }
+    }
+}
+
+/// A BSDF in a frame that a map turns.
+fn relief<'a>(
+    context: &mut Context<'a>,
+    child: Child<'a>,
+    props: &Props<'a>,
+    map: ReliefMap,
+) -> Result<Bsdf, SceneError> {
+    let flips = props.boolean("flip_invalid_normals")?.is_none_or(|given| given.value);
+    let fades = props.boolean("use_shadowing_function")?.is_none_or(|given| given.value);
     let inner = only_child(child, props)?;
+    let nested = convert(context, inner)?;
+    if matches!(nested, Bsdf::Null | Bsdf::Mask { .. } | Bsdf::Sides { .. } | Bsdf::Relief { .. }) {
+        let (what, found) = (child.object.describe(), inner.object.describe());
+        return Err(inner.at.error(format!("{what} cannot hold {found}; it must be inside of that")));
+    }
+    let around_two_sides = nested.clone().two_sided().is_some_and(|both| both == nested);
+    Ok(Bsdf::Relief { relief: Relief { map, flips, fades, around_two_sides }, nested: Box::new(nested) })
+}
+
+fn two_sided<'a>(context: &mut Context<'a>, child: Child<'a>, props: &Props<'a>) -> Result<Bsdf, SceneError> {
+    let inside = props.children(Kind::Bsdf);
+    let (inner, back) = match inside[..] {
+        [inner] => (inner, None),
+        [front, back] => (front, Some(back)),
+        _ => {
+            let (what, count) = (child.object.describe(), inside.len());
+            return Err(child.object.at.error(format!("{what} holds {count} BSDFs; it must hold one or two")));
+        }
+    };
+    let front = one_side(context, inner)?;
+    let Some(back) = back else { return Ok(front) };
+    Ok(Bsdf::Sides { front: Box::new(front), back: Box::new(one_side(context, back)?) })
+}
+
+/// A BSDF inside of `twosided`, with the back like the front.
+fn one_side<'a>(context: &mut Context<'a>, inner: Child<'a>) -> Result<Bsdf, SceneError> {
     if !ONE_SIDED.contains(&inner.object.plugin.as_str()) {
         return Err(inner.at.error(format!(
             "<bsdf type=\"twosided\"> cannot hold {}; it must hold one of type {}",
@@ -122,7 +235,12 @@ fn two_sided<'a>(context: &mut Context<'a>, child: Child<'a>, props: &Props<'a>)
             list(ONE_SIDED.into_iter())
         )));
     }
-    Ok(convert(context, inner)?.two_sided().expect("the one-sided types are those that have the flag"))
+    convert(context, inner)?.two_sided().ok_or_else(|| {
+        inner.at.error(format!(
+            "{} lets light through, so that it cannot be inside of <bsdf type=\"twosided\">",
+            inner.object.describe()
+        ))
+    })
 }
 
 /// The one BSDF inside another.

@@ -9,18 +9,22 @@ use super::props::{Child, Props};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
 use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture};
 use crate::scene::mesh::FileMesh;
-use crate::scene::{Bitmap, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape};
+use crate::scene::{Aov, Bitmap, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape};
 
 /// What the converters of single objects share.
 pub(super) struct Context<'a> {
     pub tree: &'a Tree,
     pub warnings: Vec<String>,
     pub media: Vec<Medium>,
+    /// Channels beside the radiance.
+    pub aovs: Vec<Aov>,
     /// Images by file, and whether they are raw.
     pub images: HashMap<(PathBuf, bool), Arc<Bitmap>>,
     /// Meshes as they are in their files.
     pub meshes: HashMap<MeshKey, Arc<FileMesh>>,
     medium_ids: HashMap<ObjectId, MediumId>,
+    /// BSDFs that are being read, each inside of the one before it.
+    pub open_bsdfs: Vec<ObjectId>,
 }
 
 impl<'a> Context<'a> {
@@ -46,7 +50,16 @@ impl<'a> Context<'a> {
 pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     let root = &tree.objects[0];
     let (images, meshes, medium_ids) = (HashMap::new(), HashMap::new(), HashMap::new());
-    let mut context = Context { tree, warnings: Vec::new(), media: Vec::new(), images, meshes, medium_ids };
+    let mut context = Context {
+        tree,
+        warnings: Vec::new(),
+        media: Vec::new(),
+        aovs: Vec::new(),
+        images,
+        meshes,
+        medium_ids,
+        open_bsdfs: Vec::new(),
+    };
     let props = Props::new(tree, root);
     refuse_doubles(root)?;
 
@@ -95,6 +108,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
         shapes,
         media: context.media,
         lights,
+        aovs: context.aovs,
         sample_count: sensor.sample_count,
     };
     context.warnings.extend(tree.warnings());

@@ -2,8 +2,9 @@
 
 use super::build::Context;
 use super::props::{Child, Props, unknown_plugin};
+use super::texture::choice;
 use super::tree::Kind;
-use crate::scene::{Crop, Film, SceneError};
+use crate::scene::{Colors, Crop, Film, PixelFormat, ReconstructionFilter, SceneError};
 
 pub(super) const FILM_TYPES: [&str; 1] = ["hdrfilm"];
 pub(super) const SAMPLER_TYPES: [&str; 5] = ["independent", "stratified", "multijitter", "orthogonal", "ldsampler"];
@@ -11,8 +12,11 @@ pub(super) const FILTER_TYPES: [&str; 6] = ["box", "tent", "gaussian", "mitchell
 
 /// The film that Mitsuba takes where a sensor has none.
 pub(super) fn default_film() -> Film {
-    Film::new(768, 576)
+    Film { filter: ReconstructionFilter::DEFAULT, ..Film::new(768, 576) }
 }
+
+/// How far a filter may reach, in pixels.
+const MAX_FILTER_RADIUS: f64 = 32.0;
 
 /// Samples a pixel that Mitsuba takes where a scene does not say.
 pub(super) const DEFAULT_SAMPLE_COUNT: u32 = 4;
@@ -40,29 +44,37 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
         )));
     }
 
-    match props.string("pixel_format")? {
-        Some(given) if !matches!(given.value.to_ascii_lowercase().as_str(), "rgb" | "rgba") => {
-            let text = format!("the image is written as RGB, not as \"{}\"", given.value);
-            context.warnings.push(given.at.warning(text));
-        }
-        _ => {}
-    }
-    // What the file is like is up to the command line; the others do not matter with a box filter of one pixel.
-    props.string("component_format")?;
-    props.string("file_format")?;
+    let pixel_format = pixel_format(&props)?;
+    // Sums are exact here without compensation.
     props.ignore_boolean("compensate")?;
-    props.ignore_boolean("sample_border")?;
+    // Of Mitsuba's older versions; newer ones read over it.
+    props.ignore_boolean("banner")?;
+    let beyond = props.boolean("sample_border")?.is_some_and(|given| given.value);
     let filter = props.child(Kind::Rfilter)?;
     props.finish()?;
-    match filter {
+    let filter = match filter {
         Some(filter) => self::filter(context, filter)?,
-        None => {
-            let text = "a box filter of one pixel is used, where Mitsuba's default is \"gaussian\"; add \
-                        <rfilter type=\"box\"/> for the same picture in both";
-            context.warnings.push(child.object.at.warning(text));
-        }
-    }
-    Ok(Film { width, height, crop })
+        None => ReconstructionFilter::DEFAULT,
+    };
+    let sample_area = if beyond { None } else { Some(crop) };
+    Ok(Film { width, height, crop, filter, sample_area, pixel_format })
+}
+
+/// How pixels are written.
+fn pixel_format(props: &Props) -> Result<PixelFormat, SceneError> {
+    let formats = [
+        ("rgb", (Colors::Rgb, false)),
+        ("rgba", (Colors::Rgb, true)),
+        ("xyz", (Colors::Xyz, false)),
+        ("xyza", (Colors::Xyz, true)),
+        ("luminance", (Colors::Luminance, false)),
+        ("luminance_alpha", (Colors::Luminance, true)),
+    ];
+    let (colors, alpha) = choice(props, "pixel_format", &formats)?;
+    // Mitsuba's default is float16, which is a matter of the file alone: here nothing is lost unless the scene asks for it.
+    let half = choice(props, "component_format", &[("float32", false), ("float16", true)])?;
+    choice(props, "file_format", &[("openexr", ()), ("exr", ())])?;
+    Ok(PixelFormat { colors, alpha, half })
 }
 
 /// One side of the film.
@@ -95,20 +107,45 @@ fn span(
     }
 }
 
-fn filter<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<(), SceneError> {
-    let plugin = child.object.plugin.as_str();
-    if !FILTER_TYPES.contains(&plugin) {
-        return Err(unknown_plugin(child.object, &FILTER_TYPES));
-    }
+/// A reconstruction filter.
+fn filter<'a>(context: &Context<'a>, child: Child<'a>) -> Result<ReconstructionFilter, SceneError> {
     let props = context.props(child);
-    if plugin != "box" {
-        for name in ["stddev", "radius", "lobes", "A", "B"] {
-            props.float(name)?;
+    // A length in pixels. Wider filters than the limit would have no use, and their tables none of their accuracy.
+    let length = |name, default: f64, most: f64| match props.float(name)? {
+        None => Ok(default),
+        Some(given) if given.value > 0.0 && given.value <= most => Ok(given.value),
+        Some(given) => Err(given.at.error(format!(
+            "{name} of a filter is {}; it must be greater than 0 and at most {most} pixels",
+            given.value
+        ))),
+    };
+    let weight = |name, default: f64| match props.float(name)? {
+        None => Ok(default),
+        Some(given) if (-1.0..=1.0).contains(&given.value) => Ok(given.value),
+        Some(given) => {
+            Err(given.at.error(format!("{name} of a filter is {}; it must lie between -1 and 1", given.value)))
         }
-        let text = format!("a box filter of one pixel is used, not \"{plugin}\"");
-        context.warnings.push(child.at.warning(text));
-    }
-    props.finish()
+    };
+    let filter = match child.object.plugin.as_str() {
+        "box" => ReconstructionFilter::Box { radius: length("radius", 0.5, MAX_FILTER_RADIUS)? },
+        "tent" => ReconstructionFilter::Tent { radius: length("radius", 1.0, MAX_FILTER_RADIUS)? },
+        "gaussian" => ReconstructionFilter::Gaussian { stddev: length("stddev", 0.5, MAX_FILTER_RADIUS / 4.0)? },
+        "mitchell" => ReconstructionFilter::Mitchell { b: weight("B", 1.0 / 3.0)?, c: weight("C", 1.0 / 3.0)? },
+        "catmullrom" => ReconstructionFilter::CATMULL_ROM,
+        "lanczos" => match props.integer("lobes")? {
+            None => ReconstructionFilter::Lanczos { lobes: 3.0 },
+            Some(given) if (1..=MAX_FILTER_RADIUS as i64).contains(&given.value) => {
+                ReconstructionFilter::Lanczos { lobes: given.value as f64 }
+            }
+            Some(given) => {
+                let text = format!("lobes is {}; it must lie between 1 and {MAX_FILTER_RADIUS}", given.value);
+                return Err(given.at.error(text));
+            }
+        },
+        _ => return Err(unknown_plugin(child.object, &FILTER_TYPES)),
+    };
+    props.finish()?;
+    Ok(filter)
 }
 
 /// Samples a pixel. The sampler's type does not matter: there is one, and it is better than these.

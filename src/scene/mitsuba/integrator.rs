@@ -1,9 +1,10 @@
 //! `<integrator>`: how long paths may get.
 
 use super::build::Context;
-use super::props::{Child, Props, unknown_plugin};
+use super::props::{Child, Given, Props, unknown_plugin};
+use super::suggest::list;
 use super::tree::Kind;
-use crate::scene::{Integrator, SceneError};
+use crate::scene::{Aov, AovKind, Integrator, SceneError};
 
 pub(super) const TYPES: [&str; 6] = ["volpath", "volpathmis", "path", "direct", "moment", "aov"];
 
@@ -67,10 +68,16 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
 fn wrapped<'a>(context: &mut Context<'a>, child: Child<'a>, props: Props<'a>) -> Result<Integrator, SceneError> {
     let inside = props.children(Kind::Integrator);
     if child.object.plugin == "aov"
-        && let Some(aovs) = props.string("aovs")?
+        && let Some(given) = props.string("aovs")?
     {
-        let text = format!("the channels \"{}\" are not written", aovs.value);
-        context.warnings.push(aovs.at.warning(text));
+        let tokens = given.value.split([',', ' ']).filter(|token| !token.is_empty());
+        let read = tokens.map(|token| aov(token, &given)).collect::<Result<Vec<Aov>, SceneError>>()?;
+        for aov in &read {
+            if aov.name.is_empty() || read.iter().filter(|other| other.name == aov.name).count() > 1 {
+                return Err(given.at.error(format!("aovs needs a name of its own for each; \"{}\" is not", aov.name)));
+            }
+        }
+        context.aovs = read;
     }
     props.integer("block_size")?;
     props.integer("samples_per_pass")?;
@@ -85,6 +92,21 @@ fn wrapped<'a>(context: &mut Context<'a>, child: Child<'a>, props: Props<'a>) ->
         return Err(inner.at.error(format!("{what} cannot hold {found}; it must hold one that renders")));
     }
     convert(context, inner)
+}
+
+/// One `name:type` of `aovs`.
+fn aov(token: &str, given: &Given<String>) -> Result<Aov, SceneError> {
+    let kinds = || AovKind::ALL.iter().map(|(name, ..)| *name);
+    let found = token
+        .split_once(':')
+        .and_then(|(name, kind)| Some((name, AovKind::ALL.iter().find(|(known, ..)| *known == kind)?)));
+    match found {
+        Some((name, (_, kind, _))) => Ok(Aov { name: name.to_owned(), kind: *kind }),
+        None => Err(given.at.error(format!(
+            "aovs has \"{token}\"; accepted: pairs name:type with commas between them, and of types {}",
+            list(kinds())
+        ))),
+    }
 }
 
 /// Mitsuba's surface integrators see no media; ours always does.

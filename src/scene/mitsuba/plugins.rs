@@ -21,17 +21,15 @@ pub(super) const SUPPORTED: [(Kind, &[&str]); 12] = [
 
 /// Plugins of Mitsuba 3.9 that are not supported, and what to use instead. An entry of a plugin that is supported has no
 /// effect.
-pub(super) const REFUSED: [(Kind, &str, &str); 42] = [
+pub(super) const REFUSED: [(Kind, &str, &str); 37] = [
     (Kind::Integrator, "ptracer", "use \"volpath\": light is not traced from the emitters here"),
     (Kind::Integrator, "depth", "use \"volpath\": only radiance is rendered"),
     (Kind::Integrator, "stokes", "use \"volpath\": light is not polarised here"),
     (Kind::Integrator, "prb", "use \"path\": nothing is differentiated here"),
     (Kind::Integrator, "prbvolpath", "use \"volpath\": nothing is differentiated here"),
-    (Kind::Sensor, "thinlens", "use \"perspective\": cameras have no lens"),
-    (Kind::Sensor, "orthographic", "use \"perspective\" with a small fov from far away"),
-    (Kind::Sensor, "radiancemeter", "use \"perspective\" with a small fov"),
+    (Kind::Sensor, "radiancemeter", "use \"orthographic\" with a small scale"),
     (Kind::Sensor, "irradiancemeter", "use \"perspective\", which sees a diffuse surface there"),
-    (Kind::Sensor, "distant", "use \"perspective\" with a small fov from far away"),
+    (Kind::Sensor, "distant", "use \"orthographic\""),
     (Kind::Sensor, "batch", "use one scene file for each camera"),
     (Kind::Film, "specfilm", "use \"hdrfilm\": light has three channels here"),
     (Kind::Medium, "heterogeneous", "use \"homogeneous\" in nested boundaries"),
@@ -42,13 +40,6 @@ pub(super) const REFUSED: [(Kind, &str, &str); 42] = [
     (Kind::Shape, "ellipsoidsmesh", "use a mesh file (obj or ply)"),
     (Kind::Shape, "sdfgrid", "convert it to a mesh file (obj or ply)"),
     (Kind::Shape, "merge", "put its shapes directly into the scene"),
-    (
-        Kind::Bsdf,
-        "blendbsdf",
-        "use the one of its two BSDFs that matters more, or \"mask\" where one of them is \"null\"",
-    ),
-    (Kind::Bsdf, "bumpmap", "use the BSDF inside, with the bumps in the mesh"),
-    (Kind::Bsdf, "normalmap", "use the BSDF inside, with the normals in the mesh"),
     (
         Kind::Bsdf,
         "principled",

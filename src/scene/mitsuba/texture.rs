@@ -63,8 +63,13 @@ pub(super) fn gray_fraction<'a>(
     name: &'static str,
     default: f64,
 ) -> Result<Texture, SceneError> {
+    fraction(context, props, name, default).map(gray)
+}
+
+/// A texture without colour.
+pub(super) fn gray(texture: Texture) -> Texture {
     let mean = |color: DVec3| DVec3::splat(color.element_sum() / 3.0);
-    Ok(match fraction(context, props, name, default)? {
+    match texture {
         Texture::Constant(color) => mean(color).into(),
         Texture::Checkerboard { color0, color1, to_uv } => {
             Texture::Checkerboard { color0: mean(color0), color1: mean(color1), to_uv }
@@ -74,7 +79,7 @@ pub(super) fn gray_fraction<'a>(
             let bitmap = if gray { bitmap } else { Arc::new(bitmap.map(|pixel| [bitmap::luminance(pixel); 3])) };
             Texture::Bitmap { bitmap, filter, wrap, to_uv }
         }
-    })
+    }
 }
 
 /// A texture.
