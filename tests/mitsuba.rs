@@ -150,8 +150,12 @@ fn a_box_of_one_pixel_costs_nothing_and_is_the_filter_of_the_general_kernel() {
     scene.film.filter = ReconstructionFilter::Box { radius: 0.5000001 };
     let general = pack(&scene, 3);
     assert!(general.features.filter);
-    let variant =
-        Variant { features: general.features, workgroup: common::device().subgroup_size, buffer_reference: false };
+    let variant = Variant {
+        features: general.features,
+        immediates: general.immediates().to_vec(),
+        workgroup: common::device().subgroup_size,
+        buffer_reference: false,
+    };
     let image = mean(&with_variant(&general, 4096, &variant));
     assert_eq!(farthest(&image, &EDGES[0].2, 6e-3), None);
 }
