@@ -27,9 +27,6 @@ Hit begin_hit(Path path) {
         hit.tau = tau.x;
         hit.tau_rgb = tau;
     }
-    if (HAS_GRIDS && path.shadow) {
-        hit.passed = path.passed;
-    }
     return hit;
 }
 

@@ -1,9 +1,7 @@
 //! How distances are sampled in each medium.
 
 use super::frame::{Bounds, Frame};
-use super::layout::{
-    LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, Light, MEDIUM_HEIGHT, MEDIUM_VOXELS, Medium,
-};
+use super::layout::{LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, Light, MEDIUM_HEIGHT, MEDIUM_VOXELS, Medium};
 use super::nesting::Nesting;
 use crate::scene::{MediumId, Scene};
 

@@ -164,9 +164,8 @@ pub fn bounds(scene: &Scene) -> Bounds {
 /// Voxels whose values may count at a place in a cell: those from the first to the last, before they are wrapped.
 fn reach(cell: u32, cells: u32, size: u32, nearest: bool) -> [i64; 2] {
     let center = if nearest { 0.0 } else { 0.5 };
-    let voxel = |side: u32, slack: f64| {
-        (f64::from(side) / f64::from(cells) * f64::from(size) - center + slack).floor() as i64
-    };
+    let voxel =
+        |side: u32, slack: f64| (f64::from(side) / f64::from(cells) * f64::from(size) - center + slack).floor() as i64;
     let last = voxel(cell + 1, SLACK) + i64::from(!nearest);
     [voxel(cell, -SLACK), last]
 }
@@ -207,10 +206,12 @@ fn cells(field: &GridVolume, medium: &scene::Medium, sigma_t: Vec3, entry: &Grid
             (first..=last).map(|voxel| wrapped(voxel, size[k], field.wrap)).collect::<Vec<u32>>()
         });
         let (mut most, mut least, mut sum, mut bright) = (0f32, f32::INFINITY, 0f64, 0f32);
-        for (&x, &y, &z) in zs.iter().flat_map(|z| ys.iter().flat_map({
-            let xs = &xs;
-            move |y| xs.iter().map(move |x| (x, y, z))
-        })) {
+        for (&x, &y, &z) in zs.iter().flat_map(|z| {
+            ys.iter().flat_map({
+                let xs = &xs;
+                move |y| xs.iter().map(move |x| (x, y, z))
+            })
+        }) {
             let sigma = sigma_t * Vec3::from(field.grid.voxel(x, y, z));
             most = most.max(sigma.max_element());
             least = least.min(sigma.min_element());

@@ -272,7 +272,11 @@ pub fn height_flight(grid: &Grid, origin: DVec3, direction: DVec3, t_begin: f64,
             return wanted;
         }
         let part = (wanted - below) * slope / exp_minus(begin.max(0.0)).max(1e-37);
-        return if part < 1.0 { (below + minus_log_1m(part) / slope).min(INFINITE_DISTANCE) } else { INFINITE_DISTANCE };
+        return if part < 1.0 {
+            (below + minus_log_1m(part) / slope).min(INFINITE_DISTANCE)
+        } else {
+            INFINITE_DISTANCE
+        };
     }
     if begin <= 0.0 {
         return wanted;

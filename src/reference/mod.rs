@@ -10,6 +10,7 @@ pub mod bvh;
 pub mod camera;
 pub mod equiangular;
 pub mod film;
+pub mod grid;
 pub mod light;
 pub mod math;
 pub mod medium;

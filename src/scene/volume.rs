@@ -93,10 +93,7 @@ impl Grid {
             let voxel = index / channels;
             let (x, y) = (voxel % resolution[0], voxel / resolution[0] % resolution[1]);
             let z = voxel / (resolution[0] * resolution[1]);
-            return Err(format!(
-                "voxel ({x}, {y}, {z}) is {}; voxels must be finite and not negative",
-                values[index]
-            ));
+            return Err(format!("voxel ({x}, {y}, {z}) is {}; voxels must be finite and not negative", values[index]));
         }
         Ok(Grid { resolution: resolution.map(|side| side as u32), channels: channels as u32, values })
     }
@@ -169,7 +166,8 @@ impl Grid {
                 bytes.len() - HEAD
             ));
         }
-        let corner = |first: usize| DVec3::from_array([0, 1, 2].map(|k| f64::from(f32::from_bits(word(first + k) as u32))));
+        let corner =
+            |first: usize| DVec3::from_array([0, 1, 2].map(|k| f64::from(f32::from_bits(word(first + k) as u32))));
         let bounds = [corner(5), corner(8)];
         if !bounds[0].is_finite() || !bounds[1].is_finite() || bounds[0].cmpge(bounds[1]).any() {
             return Err(format!("its bounding box from {} to {} is empty", bounds[0], bounds[1]));
@@ -201,7 +199,10 @@ fn checked_count(resolution: [usize; 3], channels: usize) -> Result<usize, Strin
     }
     let count = x.checked_mul(y).and_then(|n| n.checked_mul(z)).and_then(|n| n.checked_mul(channels));
     count.filter(|count| u32::try_from(*count).is_ok()).ok_or_else(|| {
-        format!("{x} x {y} x {z} voxels of {channels} channels are more numbers than the {} that a scene can hold", u32::MAX)
+        format!(
+            "{x} x {y} x {z} voxels of {channels} channels are more numbers than the {} that a scene can hold",
+            u32::MAX
+        )
     })
 }
 

@@ -9,9 +9,7 @@ use super::props::{Child, Props};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
 use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture};
 use crate::scene::mesh::{self, FileMesh};
-use crate::scene::{
-    Bitmap, Geometry, Grid, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape, Volume,
-};
+use crate::scene::{Bitmap, Geometry, Grid, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape, Volume};
 use glam::DVec3;
 
 /// What the converters of single objects share.
@@ -111,11 +109,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
 
 /// Media, BSDFs and textures that stand directly in the scene are there to be referred to. They are checked even if nobody does,
 /// since a fault in them is one that waits. A medium of voxels that nobody refers to fills the box of its voxels.
-fn declarations<'a>(
-    context: &mut Context<'a>,
-    props: &Props<'a>,
-    shapes: &mut Vec<Shape>,
-) -> Result<(), SceneError> {
+fn declarations<'a>(context: &mut Context<'a>, props: &Props<'a>, shapes: &mut Vec<Shape>) -> Result<(), SceneError> {
     let used = used(context.tree);
     for kind in [Kind::Medium, Kind::Bsdf, Kind::Phase, Kind::Texture] {
         for child in props.children(kind) {

@@ -112,7 +112,8 @@ fn heterogeneous<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Medi
     if most > 1.0 {
         return Err(albedo_at.error(format!("the largest albedo is {most}; it must lie between 0 and 1")));
     }
-    if matches!(sigma_t.field, Some(Volume::Height(_))) && (emission.field.is_some() || emission.factor != DVec3::ZERO) {
+    if matches!(sigma_t.field, Some(Volume::Height(_))) && (emission.field.is_some() || emission.factor != DVec3::ZERO)
+    {
         return Err(emission_at.error("a medium whose sigma_t is a heightvolume cannot emit"));
     }
     let only_grid = |field: Option<Volume>| match field {

@@ -199,7 +199,8 @@ impl<'a> Props<'a> {
         match spectrum::color_of(self.tree, &property.value, &property.at, meaning)? {
             Some(value) => Ok(Some(VolumeOrColor::Constant(Given { value, at: &property.at }))),
             None => {
-                let refused: Option<Given<()>> = self.typed(name, "<rgb>, <float>, <spectrum> or <volume>", |_| None)?;
+                let refused: Option<Given<()>> =
+                    self.typed(name, "<rgb>, <float>, <spectrum> or <volume>", |_| None)?;
                 Ok(refused.map(|_| unreachable!("nothing is accepted")))
             }
         }

@@ -44,9 +44,7 @@ pub(super) fn coefficient<'a>(
                     None => Ok(Coefficient { factor: DVec3::ONE, field: None }),
                 }
             }
-            "gridvolume" => {
-                Ok(Coefficient { factor: DVec3::ONE, field: Some(Volume::Grid(grid(context, child)?)) })
-            }
+            "gridvolume" => Ok(Coefficient { factor: DVec3::ONE, field: Some(Volume::Grid(grid(context, child)?)) }),
             "heightvolume" => height(context, child, name),
             _ => Err(unknown_plugin(child.object, &TYPES)),
         },
@@ -119,6 +117,7 @@ fn height<'a>(context: &mut Context<'a>, child: Child<'a>, name: &str) -> Result
         Some(given) => given.value.try_normalize().ok_or_else(|| given.at.error("up must not be zero"))?,
         None => DVec3::Y,
     };
-    let field = HeightVolume { base: base.map_or(DVec3::ZERO, |given| given.value), up, scale_height: scale_height.value };
+    let field =
+        HeightVolume { base: base.map_or(DVec3::ZERO, |given| given.value), up, scale_height: scale_height.value };
     Ok(Coefficient { factor, field: Some(Volume::Height(field)) })
 }
