@@ -97,7 +97,9 @@ fn lit_through(row: &Row, factor: f64) -> Case {
 #[test]
 fn transmittance_of_fields() {
     let all = rows("H");
-    let mut cases: Vec<Case> = all.iter().map(|row| transmittance(row, 1.0)).collect();
+    // Delta tracking, whose estimates are 0 or 1, takes long: every second row in a run that leaves something out.
+    let some = all.iter().step_by(if whole() { 1 } else { 2 });
+    let mut cases: Vec<Case> = some.map(|row| transmittance(row, 1.0)).collect();
     cases.extend(all.iter().map(|row| lit_through(row, 1.0)));
     judge("H", &cases, CASES);
 }
@@ -141,10 +143,13 @@ fn fill(row: &Row, slab: &Slab, mut scene: Scene, factor: f64) -> Scene {
     scene
 }
 
-fn gradients(factor: f64, names: &[&str]) -> Vec<Case> {
+/// Outputs of the rows; in a run that leaves something out, one of each.
+fn gradients(factor: f64) -> Vec<Case> {
     let mut cases = Vec::new();
-    for row in rows("H3") {
+    for (index, row) in rows("H3").into_iter().enumerate() {
         let slab = slab_of(&row);
+        let names = ["R_coll", "T_coll", "R_diff", "T_diff"];
+        let names = if whole() { &names[..] } else { &names[index % 2..=index % 2] };
         for &name in names {
             let view = if name.ends_with("diff") { slab.mean_of_directions() } else { slab.at_cosine(1.0) };
             let lit = if name.starts_with('R') { slab.lit_from_above(view) } else { slab.lit_from_below(view) };
@@ -158,13 +163,12 @@ fn gradients(factor: f64, names: &[&str]) -> Vec<Case> {
 
 #[test]
 fn slabs_whose_density_changes_with_depth() {
-    let names: &[&str] = if whole() { &["R_coll", "T_coll", "R_diff", "T_diff"] } else { &["R_coll", "T_coll"] };
-    judge("H3", &gradients(1.0, names), CASES);
+    judge("H3", &gradients(1.0), CASES);
 }
 
 #[test]
 fn wrong_densities_are_rejected() {
-    must_reject(&gradients(1.2, &["T_coll"]));
+    must_reject(&gradients(1.2)[..1]);
 }
 
 /// Layers on top of each other, each a box of one voxel, or homogeneous every other one.
