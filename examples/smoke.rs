@@ -43,7 +43,7 @@ fn density(p: DVec3) -> f64 {
         (0..5).map(|octave| noise(q * 5.0 * 2f64.powi(octave), 4 + octave as u32) / 2f64.powi(octave)).sum();
     let ends = smooth(p.y / 0.08) * smooth((0.97 - p.y) / 0.25);
     let edges = smooth(p.x.min(1.0 - p.x) / 0.05) * smooth(p.z.min(1.0 - p.z) / 0.05);
-    (inside + 0.9 * (billows - 1.0)).clamp(0.0, 1.0) * ends * edges
+    (2.5 * (inside + 1.1 * (billows - 1.0))).clamp(0.0, 1.0) * ends * edges
 }
 
 /// From 0 to 1 with level ends.
