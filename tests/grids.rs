@@ -11,6 +11,8 @@ use common::tolerances::comparison;
 use common::units::{run, vec4, widen};
 use glam::{DMat4, DVec3};
 use std::sync::Arc;
+use tyndall::gpu::Renderer;
+use tyndall::gpu::shader::Variant;
 use tyndall::pack::Packed;
 use tyndall::pack::layout::{self, MEDIUM_VOXELS};
 use tyndall::reference::grid as reference;
@@ -452,6 +454,35 @@ fn voxels_that_absorb_nothing_are_not_seen_in_a_white_sky() {
         let (mean, error) = mean_and_error(&batches);
         assert!((mean - 1.0).abs() > 4.0 * error + 1e-5, "an albedo of 0.95 passes");
     }
+}
+
+/// A table that is larger than a descriptor can bind is read by address, or refused.
+#[test]
+fn voxels_beyond_the_binding_range() {
+    let device = common::device();
+    let mut scene = scenes::smoke();
+    scene.film = Film::new(8, 8);
+    let small = scenes::pack(&scene, 3);
+    let mut large = small.clone();
+    // The same voxels and cells, behind as many numbers as no descriptor reaches.
+    let before = device.max_binding as usize / size_of::<f32>();
+    if before > 1 << 28 {
+        return; // More than a test should ask of a device.
+    }
+    large.values = vec![f32::NAN; before];
+    large.values.extend(&small.values);
+    for grid in &mut large.grids {
+        grid.first_value += before as u32;
+        grid.first_cell += before as u32;
+    }
+    let features = small.features;
+    let variant = |buffer_reference| Variant { features, workgroup: device.subgroup_size, buffer_reference };
+    if device.buffer_reference {
+        assert_eq!(images::on_device(&large, 16), images::on_device(&small, 16));
+    }
+    let refused =
+        Renderer::with_variant(device, &large, &variant(false)).err().expect("it cannot be bound").to_string();
+    assert!(refused.contains("values take") && refused.contains("can bind"), "{refused}");
 }
 
 #[test]

@@ -67,6 +67,12 @@ impl Renderer {
             Buffer::new(device, "values", &packed.values)?,
             Buffer::new(device, "grids", &packed.grids)?,
         ];
+        if !variant.buffer_reference
+            && let Some(table) = tables.iter().find(|table| table.size() > device.max_binding)
+        {
+            let (name, size, limit) = (table.name().to_owned(), table.size(), device.max_binding);
+            return Err(Error::TooLarge { name, size, limit });
+        }
         let crop = [packed.params.crop_width, packed.params.crop_height];
         let pixels = tile_count(crop) as usize * TILE_PIXELS;
         let capacity = capacity(pixels);

@@ -50,7 +50,7 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "walk_to_collision", relative: 1e-5, absolute: 2e-4 },
     Tolerance { function: "height_length", relative: 1e-5, absolute: 2e-38 },
     Tolerance { function: "height_flight", relative: 2e-5, absolute: 2e-6 },
-    Tolerance { function: "log_1p", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "log_1p", relative: 4e-6, absolute: 0.0 },
     Tolerance { function: "eval_texture", relative: 0.0, absolute: 4e-5 },
     Tolerance { function: "eval_bsdf value", relative: 2e-5, absolute: 1e-15 },
     Tolerance { function: "eval_bsdf pdf", relative: 2e-5, absolute: 1e-15 },
