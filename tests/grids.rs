@@ -433,6 +433,55 @@ fn constant_voxels_are_a_homogeneous_medium() {
     }
 }
 
+/// Voxels outside of all shapes end with their box, which needs no boundary.
+#[test]
+fn voxels_that_fill_all_space_end_with_their_box() {
+    let mut bounded = scenes::smoke();
+    bounded.film = Film::new(16, 16);
+    bounded.lights.push(Light::Point { position: v(0.5, 0.4, 1.0), intensity: v(1.0, 1.5, 2.0) });
+    let box_of_smoke = bounded.shapes.iter().position(|shape| shape.name == "smoke").expect("the box");
+    let mut endless = bounded.clone();
+    let smoke = endless.shapes.remove(box_of_smoke).boundary.expect("it is a boundary").interior;
+    endless.camera.medium = smoke;
+    assert!(apart(&bounded, &endless, 512).abs() < 4.0);
+    // The camera's way into the box begins inside of it.
+    for scene in [&mut bounded, &mut endless] {
+        scene.camera = Camera::look_at(v(0.1, 0.2, 0.1), v(-0.6, -0.3, 0.0), DVec3::Y, 70.0);
+    }
+    assert!(apart(&bounded, &endless, 512).abs() < 4.0);
+    let mut without = bounded.clone();
+    without.shapes.remove(box_of_smoke);
+    assert!(apart(&bounded, &without, 512).abs() > 4.0, "no smoke at all passes");
+}
+
+/// Radiance of what glows and takes nothing away is its emission times the way through it; empty voxels glow as well.
+#[test]
+fn empty_voxels_glow() {
+    for (density, wanted) in [(0.0, 3.0), (2.0, 1.5 * (1.0 - (-4f64).exp()))] {
+        let mut scene = scenes::one_ray(v(0.1, 0.2, 4.0), v(0.1, 0.2, 0.0), 16);
+        scene.camera.near_clip = 0.01;
+        let mut glow = Medium { emission: v(1.5, 3.0, 0.75), ..scenes::gray(1.0, 0.0, 0.0) };
+        let place = unit_to(v(-1.0, -1.0, -1.0), v(1.0, 1.0, 1.0));
+        let voxels = grid([4, 4, 4], 1, |_, _, _, _| density);
+        glow.volumes.sigma_t = Some(Volume::Grid(field(voxels, place)));
+        glow.volumes.emission = Some(field(grid([3, 3, 3], 1, |_, _, _, _| 0.5), place));
+        let id = scene.add_medium(glow);
+        scene.shapes.push(scenes::box_of("glow", place, id));
+        // With extinction σ = 2 over the way 2: q/σ (1 − exp(−4)), else q times the way; q is 0.75, 1.5 and 0.375.
+        let expected = if density > 0.0 { wanted / 4.0 } else { wanted / 2.0 };
+        for (channel, factor) in [1.0, 2.0, 0.5].into_iter().enumerate() {
+            let batches: Vec<f64> = images::batches(&scene, 3, 256).iter().map(|rgb| rgb[channel]).collect();
+            let (mean, error) = mean_and_error(&batches);
+            assert!(
+                ((mean - expected * factor) / error).abs() < 4.5,
+                "{density}: {mean} ± {error}, not {}",
+                expected * factor
+            );
+            assert!((mean * 1.02 - expected * factor).abs() > 4.5 * error, "two per cent are not noticed");
+        }
+    }
+}
+
 /// A medium that absorbs nothing, before a sky of radiance 1, is not seen, whatever its density: all estimators together.
 #[test]
 fn voxels_that_absorb_nothing_are_not_seen_in_a_white_sky() {

@@ -222,8 +222,12 @@ pub fn text(report: &Value) -> String {
         if medium["emission"] != json!([0.0, 0.0, 0.0]) {
             glow = format!(", emission {}", triple(&medium["emission"]));
         }
+        let fields: String = ["sigma_t", "albedo", "emission"]
+            .iter()
+            .filter_map(|name| Some(format!("; {name} times {}", medium["volumes"][name].as_str()?)))
+            .collect();
         line(format!(
-            "  {}: sigma_t {}, albedo {}, {}{glow}",
+            "  {}: sigma_t {}, albedo {}, {}{glow}{fields}",
             medium["name"],
             triple(&medium["sigma_t"]),
             triple(&medium["albedo"]),

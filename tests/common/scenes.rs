@@ -462,7 +462,7 @@ pub fn voxels() -> Scene {
 /// Gray voxels in a box of their own, over a floor, in the sun; and glowing voxels in a homogeneous medium.
 pub fn smoke() -> Scene {
     let mut scene = still_life(false);
-    let place = unit_to(v(-1.0, -0.9, -0.8), v(1.0, 0.9, 0.6));
+    let place = unit_to(v(-1.15, -0.95, -0.8), v(0.9, 0.9, 0.6));
     let density = grid([24, 20, 16], 1, |x, y, z, _| {
         let [x, y, z] = [(x as f64 - 11.5) / 12.0, (y as f64 - 9.5) / 10.0, (z as f64 - 7.5) / 8.0];
         (1.0 - x * x - y * y - z * z).max(0.0) * (1.0 + (9.0 * x).sin() * (7.0 * y).cos())

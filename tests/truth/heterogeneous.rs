@@ -44,7 +44,7 @@ fn volume(input: &Value) -> (Volume, f64) {
             let size = input["shape"].as_array().expect("a grid has a shape");
             let size = [0, 1, 2].map(|k| size[k].as_u64().expect("a size") as usize);
             let rule = |x: usize, y: usize, z: usize, _: usize| match input["values"].as_str() {
-                Some("checker") => f64::from(u8::from((x + y + z) % 2 == 0)) * 2.0,
+                Some("checker") => f64::from(u8::from((x + y + z).is_multiple_of(2))) * 2.0,
                 Some("pseudo") => ((7 * x + 13 * y + 29 * z + 5 * x * y * z) % 11) as f64 / 10.0,
                 other => panic!("voxels {other:?}"),
             };
