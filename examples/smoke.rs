@@ -1,4 +1,4 @@
-//! Writes the smoke of `scenes/smoke.xml`: 128³ voxels of a plume that rises and curls, the same on every machine.
+//! Writes the smoke of `scenes/volumes/smoke.xml`: 128³ voxels of a plume that rises and curls, the same on every machine.
 //!
 //!     cargo run --release --example smoke [-- FILE [SIDE [FACTOR]]]
 //!

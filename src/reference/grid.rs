@@ -263,7 +263,7 @@ pub fn log_1p(x: f64) -> f64 {
     x.ln_1p()
 }
 
-/// The way from `t_begin` on over which density times length becomes `wanted`; [`INFINITE_DISTANCE`] if it never does.
+/// The way from `t_begin` on over which density times length becomes `wanted`; 1e30 if it never does.
 pub fn height_flight(grid: &Grid, origin: DVec3, direction: DVec3, t_begin: f64, wanted: f64) -> f64 {
     let (begin, slope) = height_at(grid, origin, direction, t_begin);
     if slope > 0.0 {

@@ -129,3 +129,16 @@ fn what_is_wrong_is_refused() {
         assert!(error.contains(expected), "{inside}\n{error}");
     }
 }
+
+#[test]
+fn the_scenes_of_this_repository_are_read() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/volumes");
+    let fog = mitsuba::load(&folder.join("height_fog.xml"), &[]).unwrap();
+    assert_eq!(fog.warnings, [""; 0]);
+    assert!(Packed::new(&fog.scene, 0).unwrap().features.heights);
+    // The voxels of the smoke are not part of the repository.
+    let other = ("volume".to_owned(), crate::data("volumes/small.vol").display().to_string());
+    let smoke = mitsuba::load(&folder.join("smoke.xml"), &[other]).unwrap();
+    assert_eq!(smoke.warnings, [""; 0]);
+    assert!(Packed::new(&smoke.scene, 0).unwrap().features.voxels);
+}
