@@ -1,11 +1,12 @@
 //! Tiny scenes, built in Rust.
 
+use super::fields;
 use glam::{DAffine2, DMat3, DMat4, DVec2, DVec3};
 use std::sync::Arc;
 use tyndall::pack::Packed;
 use tyndall::scene::{
-    Bitmap, Bsdf, Camera, Distribution, Film, Filter, Geometry, Grid, GridVolume, HeightVolume, Light, Medium,
-    MediumId, Mesh, Phase, Roughness, Scene, Shape, Texture, Volume, Volumes, Wrap,
+    Bitmap, Bsdf, Camera, Distribution, Film, Filter, Geometry, Light, Medium, Mesh, Phase, Roughness, Scene, Shape,
+    Texture, Wrap,
 };
 
 /// The tables of a scene.
@@ -83,7 +84,8 @@ pub fn icosphere(level: u32) -> Mesh {
     Mesh { positions, triangles, ..Mesh::default() }
 }
 
-fn phase(g: f64) -> Phase {
+/// Henyey and Greenstein's phase function.
+pub fn phase(g: f64) -> Phase {
     if g == 0.0 { Phase::Isotropic } else { Phase::HenyeyGreenstein { g } }
 }
 
@@ -93,7 +95,7 @@ pub fn gray(sigma_t: f64, albedo: f64, g: f64) -> Medium {
 }
 
 /// The walls of an open box from −1 to 1, seen from +z.
-fn walls(scene: &mut Scene) {
+pub fn walls(scene: &mut Scene) {
     let (white, red, green) = (v(0.7, 0.7, 0.65), v(0.6, 0.1, 0.05), v(0.1, 0.5, 0.1));
     let (x, y, z) = (DVec3::X * 2.0, DVec3::Y * 2.0, DVec3::Z * 2.0);
     scene.shapes.push(Shape::diffuse("floor", quad(v(-1.0, -1.0, 1.0), x, -z), white));
@@ -105,11 +107,13 @@ fn walls(scene: &mut Scene) {
     scene.shapes.push(right);
 }
 
-fn lamp() -> Shape {
+/// A lamp under the ceiling.
+pub fn lamp() -> Shape {
     Shape::lamp("lamp", quad(v(-0.3, 0.98, -0.3), DVec3::X * 0.6, DVec3::Z * 0.6), v(12.0, 10.0, 6.0))
 }
 
-fn camera(distance: f64) -> Camera {
+/// A camera before the origin.
+pub fn camera(distance: f64) -> Camera {
     Camera::look_at(v(0.05, 0.1, distance), DVec3::ZERO, DVec3::Y, 42.0)
 }
 
@@ -193,7 +197,7 @@ pub fn sunny() -> Arc<Bitmap> {
 }
 
 /// A floor, a ball of haze and a metal one.
-fn still_life(fog: bool) -> Scene {
+pub fn still_life(fog: bool) -> Scene {
     let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
     let floor = quad(v(-3.0, -1.0, 3.0), DVec3::X * 6.0, DVec3::NEG_Z * 6.0);
     scene.shapes.push(Shape::diffuse("floor", floor, v(0.5, 0.6, 0.7)));
@@ -216,7 +220,7 @@ fn still_life(fog: bool) -> Scene {
 }
 
 /// A spot and parallel light, through fog that ends somewhere.
-fn spot_and_directional() -> Scene {
+pub fn spot_and_directional() -> Scene {
     let mut scene = still_life(true);
     let (position, direction) = (v(1.0, 1.5, 1.0), v(-0.8, -1.0, -0.7).normalize());
     let intensity = v(8.0, 6.0, 5.0);
@@ -394,106 +398,7 @@ pub fn metals() -> Scene {
     scene
 }
 
-/// Voxels by a rule: the number of a voxel in a channel.
-pub fn grid(size: [usize; 3], channels: usize, value: impl Fn(usize, usize, usize, usize) -> f64) -> Arc<Grid> {
-    let mut values = Vec::new();
-    for z in 0..size[2] {
-        for (y, x) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (y, x))) {
-            values.extend((0..channels).map(|channel| value(x, y, z, channel) as f32));
-        }
-    }
-    Arc::new(Grid::new(size, channels, values).expect("voxels of the tests are valid"))
-}
-
-/// Voxels in a box, trilinear, with the voxels at the faces going on.
-pub fn field(grid: Arc<Grid>, to_world: DMat4) -> GridVolume {
-    GridVolume { grid, to_world, filter: Filter::Bilinear, wrap: Wrap::Clamp }
-}
-
-/// From the unit cube to a box.
-pub fn unit_to(low: DVec3, high: DVec3) -> DMat4 {
-    DMat4::from_translation(low) * DMat4::from_scale(high - low)
-}
-
-/// The boundary of a medium that fills the box of its voxels.
-pub fn box_of(name: &str, to_world: DMat4, medium: MediumId) -> Shape {
-    Shape::boundary(name, Geometry::Mesh(tyndall::scene::mesh::box_of(to_world)), medium)
-}
-
-/// Coloured, glowing voxels, some of them empty, in a turned box, with a ball of haze and one of glass in them.
-pub fn voxels() -> Scene {
-    let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
-    walls(&mut scene);
-    scene.shapes.push(lamp());
-    let turned = DMat4::from_rotation_y(0.4) * unit_to(v(-0.7, -0.8, -0.6), v(0.6, 0.3, 0.6));
-    let rule = |x: usize, y: usize, z: usize, channel: usize| {
-        let hash = (7 * x + 13 * y + 29 * z + 5 * x * y * z) % 11;
-        if hash < 4 { 0.0 } else { hash as f64 / 10.0 * (1.0 + channel as f64) }
-    };
-    let smoke = Medium {
-        emission: v(0.3, 0.2, 0.1),
-        volumes: Volumes {
-            sigma_t: Some(Volume::Grid(field(grid([9, 6, 7], 3, rule), turned))),
-            albedo: Some(field(grid([2, 3, 2], 1, |x, y, z, _| (1 + x + y + z) as f64 / 6.0), turned)),
-            emission: Some(GridVolume {
-                filter: Filter::Nearest,
-                wrap: Wrap::Repeat,
-                ..field(grid([4, 4, 4], 3, |x, y, _, c| ((x + 2 * y + c) % 3) as f64), turned)
-            }),
-        },
-        ..Medium::new("smoke", DVec3::splat(4.0), DVec3::splat(0.9), phase(0.5))
-    };
-    let smoke = scene.add_medium(smoke);
-    scene.shapes.push(box_of("smoke", turned, smoke));
-    let haze = scene.add_medium(Medium::new("haze", v(3.0, 2.0, 1.0), v(0.9, 0.8, 0.95), phase(0.0)));
-    scene.shapes.push(Shape::boundary("haze", ball(v(0.1, -0.2, 0.1), 0.25), haze));
-    let mut glass = Shape::boundary("glass", ball(v(-0.35, -0.4, 0.2), 0.2), haze);
-    glass.bsdf = Bsdf::Dielectric {
-        int_ior: 1.5,
-        ext_ior: 1.0,
-        specular_reflectance: DVec3::ONE.into(),
-        specular_transmittance: DVec3::ONE.into(),
-    };
-    scene.shapes.push(glass);
-    scene.lights.push(Light::Constant { radiance: v(0.1, 0.2, 0.3) });
-    scene
-}
-
-/// Gray voxels in a box of their own, over a floor, in the sun; and glowing voxels in a homogeneous medium.
-pub fn smoke() -> Scene {
-    let mut scene = still_life(false);
-    let place = unit_to(v(-1.15, -0.95, -0.8), v(0.9, 0.9, 0.6));
-    let density = grid([24, 20, 16], 1, |x, y, z, _| {
-        let [x, y, z] = [(x as f64 - 11.5) / 12.0, (y as f64 - 9.5) / 10.0, (z as f64 - 7.5) / 8.0];
-        (1.0 - x * x - y * y - z * z).max(0.0) * (1.0 + (9.0 * x).sin() * (7.0 * y).cos())
-    });
-    let mut smoke = Medium::new("smoke", DVec3::splat(3.0), DVec3::splat(0.9), phase(0.3));
-    smoke.volumes.sigma_t = Some(Volume::Grid(field(density.clone(), place)));
-    let smoke = scene.add_medium(smoke);
-    scene.shapes.push(box_of("smoke", place, smoke));
-    let mut fire = Medium { emission: v(2.0, 1.0, 0.3), ..gray(0.7, 0.5, 0.0) };
-    let inner = unit_to(v(1.1, -0.9, -0.3), v(1.6, -0.2, 0.3));
-    fire.volumes.emission = Some(field(density, inner));
-    let fire = scene.add_medium(fire);
-    scene.shapes.push(Shape::boundary("fire", ball(v(1.35, -0.5, 0.0), 0.4), fire));
-    scene.lights.push(Light::Directional { direction: v(0.5, -1.0, -0.3).normalize(), irradiance: v(2.0, 1.8, 1.5) });
-    scene.lights.push(Light::Constant { radiance: v(0.2, 0.3, 0.4) });
-    scene
-}
-
-/// Fog that thins out with height, over a floor, with a ball of haze, a spot and the sun.
-pub fn height_fog() -> Scene {
-    let mut scene = spot_and_directional();
-    scene.shapes.pop(); // The box of homogeneous fog.
-    let mut fog = Medium::new("fog", v(0.5, 0.6, 0.8), DVec3::splat(0.9), phase(0.4));
-    let field = HeightVolume { base: v(0.0, -0.7, 0.0), up: v(0.1, 1.0, 0.0).normalize(), scale_height: 0.4 };
-    fog.volumes.sigma_t = Some(Volume::Height(field));
-    scene.camera.medium = Some(scene.add_medium(fog));
-    scene.lights.push(Light::Constant { radiance: v(0.2, 0.3, 0.4) });
-    scene
-}
-
-/// All scenes of this file, by name.
+/// All scenes of this file, and those of fields in space, by name.
 pub fn all() -> Vec<(&'static str, Scene)> {
     vec![
         ("gray box", gray_box()),
@@ -507,9 +412,9 @@ pub fn all() -> Vec<(&'static str, Scene)> {
         ("glow", glow()),
         ("surfaces", surfaces()),
         ("metals", metals()),
-        ("voxels", voxels()),
-        ("smoke", smoke()),
-        ("height fog", height_fog()),
+        ("voxels", fields::voxels()),
+        ("smoke", fields::smoke()),
+        ("height fog", fields::height_fog()),
     ]
 }
 

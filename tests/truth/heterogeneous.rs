@@ -3,7 +3,8 @@
 
 use super::slabs::Slab;
 use crate::CASES;
-use crate::common::scenes::{self, field, grid, quad, unit_to, v};
+use crate::common::fields::{self, field, grid, unit_to};
+use crate::common::scenes::{self, quad, v};
 use crate::common::trial::{Case, judge, must_reject};
 use crate::common::truth::{Row, full, rows, tolerance, whole};
 use glam::{DMat4, DVec3};
@@ -69,7 +70,7 @@ fn transmittance(row: &Row, factor: f64) -> Case {
     }
     medium.volumes.sigma_t = Some(field);
     let id = scene.add_medium(medium);
-    scene.shapes.push(scenes::box_of("cube", DMat4::IDENTITY, id));
+    scene.shapes.push(fields::box_of("cube", DMat4::IDENTITY, id));
     scene.lights.push(Light::Constant { radiance: DVec3::ONE });
     let (expected, error) = row.value("T");
     let tau = row.value("tau").0;
@@ -194,7 +195,7 @@ fn layers(row: &Row, from_above: bool, lit_above: bool, swap: bool) -> Scene {
             medium.volumes.sigma_t = Some(Volume::Grid(field(grid([1, 1, 1], 1, |_, _, _, _| 0.5), place)));
         }
         let id = scene.add_medium(medium);
-        scene.shapes.push(scenes::box_of("layer", place, id));
+        scene.shapes.push(fields::box_of("layer", place, id));
         top -= thick;
     }
     scene
@@ -249,7 +250,7 @@ fn fog(row: &Row, factor: f64) -> Case {
         Some(Volume::Height(HeightVolume { base: DVec3::ZERO, up: DVec3::Y, scale_height: height * factor }));
     let id = scene.add_medium(medium);
     let side = 50.0 * ymax;
-    scene.shapes.push(scenes::box_of("fog", unit_to(v(-side, -0.01, -side), v(side, ymax, side)), id));
+    scene.shapes.push(fields::box_of("fog", unit_to(v(-side, -0.01, -side), v(side, ymax, side)), id));
     let ground = quad(v(-side, 0.0, side), DVec3::X * 2.0 * side, DVec3::Z * -2.0 * side);
     scene.shapes.push(Shape::diffuse("ground", ground, DVec3::ZERO));
     let sun = -row.vector("sun_dir").normalize();
