@@ -144,10 +144,11 @@ fn fill(row: &Row, slab: &Slab, mut scene: Scene, factor: f64) -> Scene {
     scene
 }
 
-/// Outputs of the rows; in a run that leaves something out, one of each.
+/// Outputs of the rows; in a run that leaves something out, one of each, without the slab in which paths are long.
 fn gradients(factor: f64) -> Vec<Case> {
     let mut cases = Vec::new();
-    for (index, row) in rows("H3").into_iter().enumerate() {
+    let long = |row: &Row| row.number("albedo") > 0.95;
+    for (index, row) in rows("H3").into_iter().filter(|row| whole() || !long(row)).enumerate() {
         let slab = slab_of(&row);
         let names = ["R_coll", "T_coll", "R_diff", "T_diff"];
         let names = if whole() { &names[..] } else { &names[index % 2..=index % 2] };
@@ -225,12 +226,9 @@ fn layers_on_top_of_each_other() {
     if !whole() {
         // The table has no core rows.
         let row = crate::common::truth::table("H2").into_iter().find(|row| row.id == "H2:0").expect("a row");
-        for (name, from_above, lit_above) in [("R_coll_top", true, true), ("T_coll_bot", false, false)] {
-            let (expected, error) = row.value(name);
-            let scene = layers(&row, from_above, lit_above, false);
-            cases.push(Case::new(format!("{} {name}", row.id), scene, (expected, error), tolerance(&row, expected)));
-        }
         let (expected, error) = row.value("R_coll_top");
+        let scene = layers(&row, true, true, false);
+        cases.push(Case::new("H2:0 R_coll_top".to_owned(), scene, (expected, error), tolerance(&row, expected)));
         let scene = layers(&row, true, true, true);
         must_reject(&[Case::new("H2:0 turned over".to_owned(), scene, (expected, error), tolerance(&row, expected))]);
     }
