@@ -10,7 +10,7 @@ use tyndall::gpu::shader::{SOURCES, ShaderSourceText, Variant, compile, expand};
 use tyndall::gpu_struct;
 use tyndall::pack::features::Features;
 use tyndall::pack::layout::{
-    Corners, Dispatch, Field, GpuStruct, Light, Medium, Params, Phase, Primitive, Surface, Texture,
+    Corners, Dispatch, Field, GpuStruct, Grid, Light, Medium, Params, Phase, Primitive, Surface, Texture,
 };
 
 /// A shared struct as Rust has it.
@@ -32,6 +32,7 @@ fn shared_structs() -> Vec<Expected> {
         expected::<Phase>(),
         expected::<Corners>(),
         expected::<Texture>(),
+        expected::<Grid>(),
         expected::<Light>(),
         expected::<Params>(),
         expected::<Dispatch>(),

@@ -32,6 +32,8 @@ mod spectra;
 mod textures;
 #[path = "scene/unsupported.rs"]
 mod unsupported;
+#[path = "scene/volumes.rs"]
+mod volumes;
 
 use std::path::{Path, PathBuf};
 

@@ -12,6 +12,8 @@ mod absorption;
 mod beams;
 #[path = "truth/emission.rs"]
 mod emission;
+#[path = "truth/heterogeneous.rs"]
+mod heterogeneous;
 #[path = "truth/numerics.rs"]
 mod numerics;
 #[path = "truth/point_source.rs"]

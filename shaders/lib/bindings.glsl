@@ -18,6 +18,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Ph
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer CornersAddress { Corners at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer TexturesAddress { Texture at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ValuesAddress { float at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer GridsAddress { Grid at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer SamplesAddress { vec4 at[]; };
 layout(push_constant) uniform Push {
     NodesAddress nodes;
@@ -30,8 +31,8 @@ layout(push_constant) uniform Push {
     CornersAddress corners;
     TexturesAddress textures;
     ValuesAddress values;
+    GridsAddress grids;
     SamplesAddress samples;
-    uvec2 unused;
     Dispatch work;
 } push;
 uvec4 load_words(u64vec2 words) {
@@ -53,6 +54,7 @@ Primitive load_primitive(uint i) {
 #define CORNERS(i) push.corners.at[i]
 #define TEXTURE(i) push.textures.at[i]
 #define VALUE(i) push.values.at[i]
+#define GRID(i) push.grids.at[i]
 #define SAMPLE(i) push.samples.at[i]
 #else
 layout(set = 0, binding = 0, std430) readonly buffer Nodes { uvec4 nodes[]; };
@@ -65,7 +67,8 @@ layout(set = 0, binding = 6, std430) readonly buffer Phases { Phase phases[]; };
 layout(set = 0, binding = 7, std430) readonly buffer CornersOfAll { Corners corners[]; };
 layout(set = 0, binding = 8, std430) readonly buffer Textures { Texture textures[]; };
 layout(set = 0, binding = 9, std430) readonly buffer Values { float values[]; };
-layout(set = 0, binding = 10, std430) buffer Samples { vec4 samples[]; };
+layout(set = 0, binding = 10, std430) readonly buffer Grids { Grid grids[]; };
+layout(set = 0, binding = 11, std430) buffer Samples { vec4 samples[]; };
 layout(push_constant) uniform Push {
     uvec4 addresses[6];
     Dispatch work;
@@ -80,6 +83,7 @@ layout(push_constant) uniform Push {
 #define CORNERS(i) corners[i]
 #define TEXTURE(i) textures[i]
 #define VALUE(i) values[i]
+#define GRID(i) grids[i]
 #define SAMPLE(i) samples[i]
 #endif
-layout(set = 0, binding = 11, std430) readonly buffer ParamsBuffer { Params params; };
+layout(set = 0, binding = 12, std430) readonly buffer ParamsBuffer { Params params; };

@@ -1,10 +1,9 @@
 // Elementary functions with the accuracy that drivers do not promise, and orthonormal frames.
 #include "lib/constants.glsl"
 
-// -log(1 - u) for u = k / 2^24 in [0, 1): the optical depth of a free flight. Relative error below 3e-7; drivers' log() loses
-// all digits near 1. 1 - u is exact; it is split into m 2^e with m in [sqrt(1/2), sqrt(2)), and log m = 2 artanh((m - 1)/(m + 1)).
-float minus_log_1m(float u) {
-    float x = 1.0 - u;
+// -log(x) for x in (0, 1], normal. Relative error below 3e-7; drivers' log() loses all digits near 1. x is split into m 2^e with m in
+// [sqrt(1/2), sqrt(2)), and log m = 2 artanh((m - 1)/(m + 1)).
+float minus_log(float x) {
     uint bits = floatBitsToUint(x);
     // The bits of sqrt(1/2) divide one binade of m from the next.
     int exponent = int(bits - 0x3f3504f3u) >> 23;
@@ -13,6 +12,11 @@ float minus_log_1m(float u) {
     float z = s * s;
     float log_m = 2.0 * s * (1.0 + z * (0.33333334 + z * (0.2 + z * (0.14285715 + z * 0.11111111))));
     return -(float(exponent) * 0.69314718 + log_m);
+}
+
+// -log(1 - u) for u = k / 2^24 in [0, 1): the optical depth of a free flight. 1 - u is exact.
+float minus_log_1m(float u) {
+    return minus_log(1.0 - u);
 }
 
 // -log(1 - x) for any x in [0, 1 - 2^-24], also where 1 - x has lost digits of x: there Taylor's polynomial.

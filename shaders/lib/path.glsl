@@ -120,6 +120,14 @@ void scatter(inout Path path, Vertex vertex) {
     path.shadow = (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface)) && sample_light(path, vertex, u.xy, u.zw);
     path.next_direction = next.direction;
     path.next_medium = medium_towards(vertex, path.medium, next.direction);
+    if (HAS_GRIDS && path.shadow) {
+        path.medium = path.light_medium;
+        path.tau_rgb = vec3(0.0);
+        path.tau_mean = vec3(0.0);
+        path.light_passes = vec3(1.0);
+        path.passed = 1.0;
+        path.collisions = 0u;
+    }
     path.throughput *= next.weight;
     path.pdf = next.pdf;
     path.eta_scale *= next.eta * next.eta;
@@ -144,7 +152,7 @@ void next_segment(inout Path path) {
     }
     path.direction = path.next_direction;
     path.origin = offset_origin(path, path.direction);
-    path.medium = HAS_DIELECTRIC ? path.next_medium : path.medium;
+    path.medium = HAS_DIELECTRIC || HAS_GRIDS ? path.next_medium : path.medium;
     path.t_min = 0.0;
     begin_segment(path, u.zw);
 }
@@ -196,11 +204,18 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
     float t = surface_hit ? hit.t : path.t_max;
 
     Medium medium;
-    FlightEnd end = FlightEnd(false, 0.0, vec3(0.0));
+    FlightEnd end = FlightEnd(false, 0.0, vec3(0.0), 0.0);
     if (HAS_MEDIA) {
         medium = MEDIUM(valid_medium(path.medium));
-        end = end_flight(path, medium, t, surface_hit);
-        if (HAS_EMISSION) {
+        bool voxels = HAS_VOXELS && (medium.grids & MEDIUM_VOXELS) != 0u;
+        if (voxels) {
+            end = end_voxel_flight(path, medium, t, emitters_seen(path));
+        } else if (HAS_HEIGHTS && (medium.grids & MEDIUM_HEIGHT) != 0u) {
+            end = end_height_flight(path, medium, t);
+        } else {
+            end = end_flight(path, medium, t, surface_hit);
+        }
+        if (HAS_EMISSION && !voxels) {
             add_medium_emission(path, medium, end.scatters ? free_way(path, medium) : t - path.t_min, end.scatters);
         }
     }
@@ -225,17 +240,20 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         vertex.point = flight_point(path, primitive, side, end.way);
         vertex.g = medium.g;
         vertex.phase = medium.phase;
-        vertex.albedo = end.weight;
+        vertex.albedo = HAS_GRIDS ? end.weight * albedo_factor(medium, vertex.point) : end.weight;
         return true;
     }
     if (HAS_MEDIA) {
         // The optical depth of the way through the medium since t_min.
-        float way = t - path.t_min;
+        float way = HAS_GRIDS ? end.dense : t - path.t_min;
         path.tau_left -= way * (HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
         if (HAS_CHROMATIC) {
             path.tau_rgb += medium.sigma_t * way;
         } else {
             path.tau += medium.sigma_t.x * way;
+        }
+        if (HAS_GRIDS) {
+            path.tau_mean += medium.sigma_t * way;
         }
     }
     if (!surface_hit) {
@@ -298,12 +316,42 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
     return path.alive;
 }
 
-// Adds what a shadow ray brings.
+// Takes a shadow ray to the next boundary, or to its end; whether it has to go on from there.
+bool advance_shadow(inout Path path, inout Hit hit) {
+    bool reaches = hit.primitive == NONE;
+    pass_medium(path, reaches ? path.t_max : hit.t);
+    if (max_component(path.light_passes) == 0.0) {
+        hit.blocked = true;
+        return false;
+    }
+    if (reaches) {
+        hit.medium = path.medium;
+        hit.passed = path.passed;
+        return false;
+    }
+    Primitive primitive = PRIMITIVE(hit.primitive);
+    Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
+    if (HAS_MASK && (primitive.surface & PRIMITIVE_BOUNDARY) == 0u) {
+        path.passed *= 1.0 - opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric);
+    }
+    float t_max = path.t_max;
+    cross_surface(path, surface, hit);
+    path.t_max = t_max;
+    return true;
+}
+
+// Adds what a shadow ray brings, or takes it further.
 void path_light(inout Path path, Hit hit) {
+    if (HAS_GRIDS && !hit.blocked && advance_shadow(path, hit)) {
+        return;
+    }
     if (!hit.blocked) {
         vec3 transmittance = vec3(1.0);
         float survives = 1.0;
-        if (HAS_MEDIA) {
+        if (HAS_GRIDS) {
+            transmittance = path.light_passes * exp_minus(path.tau_rgb);
+            survives = dot(channel_weights(path.light_channels), exp_minus(path.tau_mean));
+        } else if (HAS_MEDIA) {
             if (HAS_CHROMATIC) {
                 transmittance = exp_minus(max(hit.tau_rgb, vec3(0.0)));
                 survives = dot(channel_weights(path.light_channels), transmittance);

@@ -3,6 +3,7 @@
 #include "lib/equiangular.glsl"
 #include "lib/light.glsl"
 #include "lib/ray.glsl"
+#include "lib/grid.glsl"
 
 // Sets of random numbers that choose what a segment's equiangular sampling goes by.
 const uint PIVOT_SET = 0x40000000u;
@@ -11,6 +12,7 @@ struct FlightEnd {
     bool scatters;
     float way;      // since t_min
     vec3 weight;    // of a path that scatters: albedo, transmittance and density of t together
+    float dense;    // density times length of the way, in units of the medium's sigma_t; 0 where voxels have been accounted for
 };
 
 // A point of the light, chosen with two random numbers, if the light is somewhere.
@@ -33,7 +35,7 @@ float free_way(Path path, Medium medium) {
 // one of two techniques: the free flight itself, or with the probability `equiangular` distances that are likely near a light.
 // The weight has the density of both (one-sample MIS).
 FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
-    FlightEnd end = FlightEnd(!surface && t_end < path.far_end, t_end - path.t_min, medium.albedo);
+    FlightEnd end = FlightEnd(!surface && t_end < path.far_end, t_end - path.t_min, medium.albedo, t_end - path.t_min);
     float sigma = HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x;
     float way = t_end - path.t_min;
     bool mixed = HAS_EQUIANGULAR && medium.equiangular > 0.0;
@@ -75,6 +77,100 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
         end.weight = medium.albedo / (1.0 - share + share * scatters * density / (sigma * exp_minus(sigma * s)));
     }
     return end;
+}
+
+// The same in a medium whose density falls with height: its optical depths are those of a homogeneous medium, with density times
+// length in the place of lengths.
+FlightEnd end_height_flight(Path path, Medium medium, float t_end) {
+    Grid grid = GRID((medium.grids & 0xffffffu) - 1u);
+    float dense = height_length(grid, path.origin, path.direction, path.t_min, t_end);
+    FlightEnd end = FlightEnd(false, t_end - path.t_min, medium.albedo, dense);
+    float wanted = free_way(path, medium);
+    if (wanted < dense) {
+        end.scatters = true;
+        end.way = min(height_flight(grid, path.origin, path.direction, path.t_min, wanted), end.way);
+        if (HAS_CHROMATIC) {
+            end.weight = scatter_weight(channel_weights(path.throughput), path.tau_rgb + medium.sigma_t * wanted, medium.sigma_t, medium.albedo);
+        }
+    }
+    return end;
+}
+
+// What a medium emits at a point, per unit of length.
+vec3 emission_at(Medium medium, vec3 point) {
+    if ((medium.grids & MEDIUM_EMISSION_GRID) == 0u) {
+        return medium.emission;
+    }
+    Grid grid = GRID((medium.grids & 0xffffffu) + 1u);
+    vec3 local = grid_local(grid, point);
+    bool outside = any(lessThan(local, vec3(0.0))) || any(greaterThan(local, vec3(1.0)));
+    return outside ? vec3(0.0) : medium.emission * grid_value(grid, local);
+}
+
+// The same through voxels, by delta tracking (Woodcock et al. 1965) with the rates of their cells: at a tentative collision light
+// scatters with the probability sigma_t / rate of the flight's channel, and else goes on. The throughput has the probabilities of
+// these decisions in all channels (one-sample MIS over the channels; Miller et al. 2019). Adds what is emitted, at each tentative
+// collision where `shines` (Raab et al. 2008).
+FlightEnd end_voxel_flight(inout Path path, Medium medium, float t_end, bool shines) {
+    uint first = (medium.grids & 0xffffffu) - 1u;
+    Grid grid = GRID(first);
+    FlightEnd end = FlightEnd(false, t_end - path.t_min, medium.albedo, 0.0);
+    if (HAS_CHROMATIC) {
+        path.throughput *= survival_weight(channel_weights(path.throughput), path.tau_rgb);
+        path.tau_rgb = vec3(0.0);
+    }
+    uvec4 key = set_key(params.seed, path.pixel, FLIGHT_STREAMS + path.segment, path.sample_index);
+    GridWalk walk = start_grid_walk(grid, path.origin, path.direction, path.t_min, t_end);
+    float tau = path.tau_left;
+    [[dont_unroll]] while (walk_to_collision(grid, false, walk, tau)) {
+        vec4 u = stream_numbers(key, path.collisions);
+        path.collisions += 1u;
+        vec3 sigma = medium.sigma_t * grid_value(grid, walk_point(grid, walk));
+        if (HAS_EMISSION && shines) {
+            path.radiance += path.throughput * emission_at(medium, path.origin + path.direction * walk.t) / walk.rate;
+        }
+        end.scatters = u.x * walk.rate < (HAS_CHROMATIC ? channel_of(sigma, path.channel) : sigma.x);
+        if (HAS_CHROMATIC) {
+            vec3 share = end.scatters ? sigma : max(walk.rate - sigma, vec3(0.0));
+            path.throughput *= share * (sum_components(path.throughput) / dot(path.throughput, share));
+        }
+        tau = minus_log_1m(u.y);
+        if (end.scatters) {
+            end.way = walk.t - path.t_min;
+            break;
+        }
+    }
+    path.tau_left = tau;
+    path.tau_mean += walk.mean;
+    return end;
+}
+
+// The albedo's factor at the end of a flight.
+vec3 albedo_factor(Medium medium, vec3 point) {
+    if ((medium.grids & MEDIUM_ALBEDO_GRID) == 0u) {
+        return vec3(1.0);
+    }
+    Grid grid = GRID(medium.grids & 0xffffffu);
+    return grid_value(grid, grid_local(grid, point));
+}
+
+// A stretch of a shadow ray from t_min to t_end, within one medium.
+void pass_medium(inout Path path, float t_end) {
+    Medium medium = MEDIUM(valid_medium(path.medium));
+    uint first = (medium.grids & 0xffffffu) - 1u;
+    if (HAS_VOXELS && (medium.grids & MEDIUM_VOXELS) != 0u) {
+        uvec4 key = set_key(params.seed, path.pixel, SHADOW_STREAMS + path.segment, path.sample_index);
+        float mean = 0.0;
+        path.light_passes *= grid_transmittance(GRID(first), medium.sigma_t, path.origin, path.direction, path.t_min, t_end, key, path.collisions, mean);
+        path.tau_mean += mean;
+        return;
+    }
+    float dense = t_end - path.t_min;
+    if (HAS_HEIGHTS && (medium.grids & MEDIUM_HEIGHT) != 0u) {
+        dense = height_length(GRID(first), path.origin, path.direction, path.t_min, t_end);
+    }
+    path.tau_rgb += medium.sigma_t * dense;
+    path.tau_mean += medium.sigma_t * dense;
 }
 
 // How near to a surface a point of a flight may round to its other side, with some room for rays that graze it.

@@ -4,6 +4,7 @@
 #include "lib/path_vertex.glsl"
 #include "lib/light.glsl"
 #include "lib/sky.glsl"
+#include "lib/grid.glsl"
 
 // Weight of a direction found by scattering that light sampling finds with density light_pdf: the balance heuristic (Veach and
 // Guibas 1995). Scattering finds the light only if the flight survives, so its probability to do so is part of the density.
@@ -71,9 +72,29 @@ void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
     path.radiance += survived_throughput(path) * light.radiance * scattering_mis_weight(path, survival(path), light_pdf);
 }
 
+// Adds what voxels emit along the flight through a homogeneous medium: one point stands for the way through them.
+void add_field_emission(inout Path path, Medium medium, float way) {
+    Grid grid = GRID((medium.grids & 0xffffffu) + 1u);
+    vec2 clipped = clip_to_grid(grid, path.origin, path.direction, path.t_min, path.t_min + way);
+    if (clipped.x >= clipped.y) {
+        return;
+    }
+    float u = sample_set(path, EMISSION_SETS + path.segment).x;
+    float t = clipped.x + u * (clipped.y - clipped.x);
+    vec3 emitted = medium.emission * grid_value(grid, grid_local(grid, path.origin + path.direction * t)) * (clipped.y - clipped.x);
+    if (HAS_CHROMATIC) {
+        emitted *= survival_weight(channel_weights(path.throughput), path.tau_rgb + medium.sigma_t * (t - path.t_min));
+    }
+    path.radiance += path.throughput * emitted;
+}
+
 // Adds what a medium emits along the flight through it, from t_min on.
 void add_medium_emission(inout Path path, Medium medium, float way, bool ended) {
     if (max_component(medium.emission) == 0.0 || !emitters_seen(path)) {
+        return;
+    }
+    if (HAS_GRIDS && (medium.grids & MEDIUM_EMISSION_GRID) != 0u) {
+        add_field_emission(path, medium, way);
         return;
     }
     vec3 length_rgb;

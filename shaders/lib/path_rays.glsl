@@ -36,7 +36,22 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
     bool begins = t > path.t_min || (t == path.t_min && index > path.last && path.last != NONE);
     // On a long, thin triangle rounding may find a distance above 0 for the triangle itself.
     begins = begins && index != path.left;
-    if (HAS_LIGHT_SAMPLING && path.shadow) {
+    if (HAS_GRIDS && HAS_LIGHT_SAMPLING && path.shadow) {
+        // In order: what lies between boundaries is not known before.
+        bool counts = begins && t < path.t_max && primitive.light != path.light + 1u;
+        bool passes = HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u;
+        if (HAS_MASK && counts && !passes) {
+            Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
+            passes = (surface.flags & SURFACE_MASK) != 0u && opacity_at(surface, primitive, index, path.origin + path.direction * t, barycentric) < 1.0;
+        }
+        hit.blocked = hit.blocked || (counts && !passes);
+        if (counts && passes && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE))) {
+            hit.t = t;
+            hit.primitive = index;
+            hit.along_normal = along_normal;
+            hit.barycentric = barycentric;
+        }
+    } else if (HAS_LIGHT_SAMPLING && path.shadow) {
         bool boundary = HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u;
         bool counts = begins && t < path.t_max;
         // The light itself is not in the way of its light.

@@ -3,12 +3,17 @@
 #include "lib/sampler.glsl"
 #include "lib/medium.glsl"
 #include "lib/light.glsl"
+#include "lib/grid.glsl"
 
 // More than minus_log_1m ever gives: no flight is longer.
 const float MAX_FLIGHT_TAU = 16.7;
 
 // Sets of the numbers that choose points of emission, one for each segment: beyond all others.
 const uint EMISSION_SETS = 0x80000000u;
+
+// Streams of numbers for tentative collisions, one for each segment's flight, and one for the shadow ray at its end.
+const uint FLIGHT_STREAMS = 0xc0000000u;
+const uint SHADOW_STREAMS = 0xe0000000u;
 
 struct Path {
     uint pixel;             // of the whole film
@@ -40,6 +45,11 @@ struct Path {
     float passed;           // where masks are: probability to pass those between the last event and t_min
     uint crossings;         // where masks are: how many the path has passed or met
     float far_end;          // where the far clip plane ends a camera ray
+    // Where media are not homogeneous; a shadow ray has its own, and of `medium`, `tau_rgb` and `passed` as well.
+    uint collisions;        // numbers of the stream that are used up
+    vec3 tau_mean;          // optical depth from the last event to t_min as the weights of light sampling see it
+    vec3 segment_weights;   // channel weights at the beginning of the segment
+    vec3 light_passes;      // shadow rays: estimate of the transmittance of voxels up to t_min
     // The shadow ray.
     vec3 next_direction;
     vec3 light_weight;      // what arrives if nothing is in the way
@@ -102,6 +112,9 @@ float flight_end(Path path) {
         return path.far_end;
     }
     Medium medium = MEDIUM(valid_medium(path.medium));
+    if (HAS_GRIDS && (medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT)) != 0u) {
+        return path.far_end;
+    }
     vec3 sigma_t = medium.sigma_t;
     float sigma = HAS_CHROMATIC ? channel_of(sigma_t, path.channel) : sigma_t.x;
     float flight = free_flight(path.tau_left, sigma);
@@ -124,14 +137,23 @@ void begin_segment(inout Path path, vec2 u) {
             path.channel = sample_channel(channel_weights(path.throughput), u.y);
         }
     }
+    if (HAS_GRIDS) {
+        path.collisions = 0u;
+        path.tau_mean = vec3(0.0);
+        path.segment_weights = channel_weights(path.throughput);
+    }
     path.t_max = flight_end(path);
 }
 
-// Probability that the flight got as far as it did, through media and masks.
+// Probability that the flight got as far as it did, through media and masks. That of voxels is not known, so the mean of each cell
+// stands for them: any weights of two strategies serve that add up to 1, so both must see the same.
 float survival(Path path) {
     float passed = HAS_MASK ? path.passed : 1.0;
     if (!HAS_MEDIA) {
         return passed;
+    }
+    if (HAS_GRIDS) {
+        return passed * dot(path.segment_weights, exp_minus(path.tau_mean));
     }
     return passed * (HAS_CHROMATIC ? survival_probability(channel_weights(path.throughput), path.tau_rgb) : exp_minus(path.tau));
 }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tyndall::pack::Packed;
 use tyndall::pack::frame::Bounds;
 use tyndall::pack::nesting::Nesting;
-use tyndall::scene::{Geometry, Light, MediumId, Phase, Scene, check};
+use tyndall::scene::{Geometry, GridVolume, Light, MediumId, Phase, Scene, Volume, Volumes, check};
 
 use super::backend;
 
@@ -60,6 +60,7 @@ pub fn of(path: &str, scene: &Scene, packed: &Packed, warnings: &[String], doubt
             "albedo": medium.albedo.to_array(),
             "phase": phase(&medium.phase),
             "emission": medium.emission.to_array(),
+            "volumes": volumes(&medium.volumes),
         })).collect::<Vec<_>>(),
         "boundaries": boundaries.collect::<Vec<_>>(),
         "lights": lights(scene),
@@ -67,6 +68,22 @@ pub fn of(path: &str, scene: &Scene, packed: &Packed, warnings: &[String], doubt
         "memory": memory(scene, packed),
         "warnings": warnings,
         "doubts": doubts,
+    })
+}
+
+/// Which coefficients of a medium depend on the place, and how.
+fn volumes(volumes: &Volumes) -> Value {
+    let voxels = |field: &GridVolume| {
+        let ([x, y, z], channels) = (field.grid.resolution(), field.grid.channels());
+        format!("{x} x {y} x {z} voxels, {channels} channels, up to {}", field.grid.max())
+    };
+    json!({
+        "sigma_t": volumes.sigma_t.as_ref().map(|field| match field {
+            Volume::Grid(field) => voxels(field),
+            Volume::Height(height) => format!("scale height {}", height.scale_height),
+        }),
+        "albedo": volumes.albedo.as_ref().map(voxels),
+        "emission": volumes.emission.as_ref().map(voxels),
     })
 }
 
@@ -132,6 +149,7 @@ fn memory(scene: &Scene, packed: &Packed) -> Value {
         + size_of_val(&packed.phases[..])
         + size_of_val(&packed.corners[..])
         + size_of_val(&packed.textures[..])
+        + size_of_val(&packed.grids[..])
         + size_of_val(&packed.values[..]);
     let meshes: usize = (scene.shapes.iter())
         .map(|shape| match &shape.geometry {
@@ -204,8 +222,12 @@ pub fn text(report: &Value) -> String {
         if medium["emission"] != json!([0.0, 0.0, 0.0]) {
             glow = format!(", emission {}", triple(&medium["emission"]));
         }
+        let fields: String = ["sigma_t", "albedo", "emission"]
+            .iter()
+            .filter_map(|name| Some(format!("; {name} times {}", medium["volumes"][name].as_str()?)))
+            .collect();
         line(format!(
-            "  {}: sigma_t {}, albedo {}, {}{glow}",
+            "  {}: sigma_t {}, albedo {}, {}{glow}{fields}",
             medium["name"],
             triple(&medium["sigma_t"]),
             triple(&medium["albedo"]),

@@ -81,6 +81,11 @@ impl Buffer {
         self.size
     }
 
+    /// What it is for.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     pub(crate) fn raw(&self) -> vk::Buffer {
         self.raw
     }

@@ -166,6 +166,8 @@ pub struct Device {
     pub buffer_reference: bool,
     /// Host memory and device memory are one.
     pub is_cpu: bool,
+    /// Bytes of a buffer that a kernel can reach through a descriptor; by address there is no limit.
+    pub max_binding: u64,
 }
 
 impl Device {
@@ -183,6 +185,7 @@ impl Device {
             loader.instance.get_physical_device_features2(candidate.physical, &mut features);
         }
         let is_cpu = properties.properties.device_type == vk::PhysicalDeviceType::CPU;
+        let max_binding = u64::from(properties.properties.limits.max_storage_buffer_range);
         let int64 = features.features.shader_int64;
         let buffer_reference = supported.buffer_device_address == vk::TRUE && int64 == vk::TRUE;
         let priorities = [1.0];
@@ -219,6 +222,7 @@ impl Device {
             subgroup_size: subgroups.subgroup_size.clamp(8, 128),
             buffer_reference,
             is_cpu,
+            max_binding,
         }))
     }
 

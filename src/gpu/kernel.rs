@@ -117,7 +117,12 @@ impl Kernel {
         let raw = &self.device.raw;
         let infos: Vec<[vk::DescriptorBufferInfo; 1]> = buffers
             .iter()
-            .map(|buffer| [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)])
+            .map(|buffer| {
+                // What is larger is read by address.
+                let range =
+                    if buffer.size() > self.device.max_binding { self.device.max_binding } else { vk::WHOLE_SIZE };
+                [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(range)]
+            })
             .collect();
         let writes: Vec<vk::WriteDescriptorSet> = (0..)
             .zip(&infos)

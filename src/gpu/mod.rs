@@ -38,6 +38,19 @@ pub enum Error {
         /// The allocator's answer.
         cause: String,
     },
+    /// A buffer that the device cannot bind.
+    #[error(
+        "{name} take {size} bytes, more than the {limit} that this device can bind: a smaller grid of voxels or image fits, and a \
+         device whose buffers have addresses has no such limit"
+    )]
+    TooLarge {
+        /// What it is for.
+        name: String,
+        /// Bytes.
+        size: u64,
+        /// The device's limit.
+        limit: u64,
+    },
     /// A kernel does not compile.
     #[error("{name}: {log}")]
     Shader {

@@ -14,8 +14,8 @@ use std::sync::Arc;
 /// Most samples in flight: their radiances take 16 bytes each.
 const MAX_SAMPLES: usize = 1 << 22;
 /// Bindings of the path tracer; the first [`ADDRESSES`] can also be read by address.
-const BINDINGS: u32 = 12;
-const ADDRESSES: usize = 11;
+const BINDINGS: u32 = 13;
+const ADDRESSES: usize = 12;
 /// Bytes of the addresses in the push constants, a multiple of 16.
 const ADDRESS_BYTES: usize = (ADDRESSES * 8).next_multiple_of(16);
 const TILE_PIXELS: usize = (TILE * TILE) as usize;
@@ -26,7 +26,7 @@ pub struct Renderer {
     path_trace: Kernel,
     resolve: Kernel,
     /// The tables that kernels only read, in the order of their bindings.
-    tables: [Buffer; 10],
+    tables: [Buffer; 11],
     params: Buffer,
     samples: Buffer,
     sums: Buffer,
@@ -66,7 +66,14 @@ impl Renderer {
             Buffer::new(device, "corners", &packed.corners)?,
             Buffer::new(device, "textures", &packed.textures)?,
             Buffer::new(device, "values", &packed.values)?,
+            Buffer::new(device, "grids", &packed.grids)?,
         ];
+        if !variant.buffer_reference
+            && let Some(table) = tables.iter().find(|table| table.size() > device.max_binding)
+        {
+            let (name, size, limit) = (table.name().to_owned(), table.size(), device.max_binding);
+            return Err(Error::TooLarge { name, size, limit });
+        }
         let crop = [packed.params.crop_width, packed.params.crop_height];
         let pixels = tile_count(crop) as usize * TILE_PIXELS;
         let capacity = capacity(pixels);

@@ -28,6 +28,10 @@ pub fn pack(scene: &Scene, frame: &Frame, id: MediumId, endless: bool) -> Result
         let value = (medium.emission / frame.scale).max_element();
         return Err(PackError::OutOfRange { what: "emission", name: medium.name.clone(), value });
     }
+    if medium.volumes.sigma_t.is_some() || medium.volumes.emission.is_some() {
+        // Voxels end with their box, and are counted along the way alone.
+        return Ok((emission, 0.0));
+    }
     if endless && (medium.sigma_t.cmple(DVec3::ZERO) & medium.emission.cmpgt(DVec3::ZERO)).any() {
         return Err(PackError::EndlessEmission(medium.name.clone()));
     }
@@ -61,6 +65,11 @@ pub struct EmittingVolume {
 /// The volume of an emitting medium; `None` if it does not emit, or is not the interior of any shape.
 pub fn enclosing_volume(scene: &Scene, frame: &Frame, id: MediumId) -> Option<EmittingVolume> {
     let filled = || scene.filled_with(id);
+    let volumes = &scene.media[id.0 as usize].volumes;
+    if volumes.sigma_t.is_some() || volumes.emission.is_some() {
+        // Light sampling has one density for all points of a homogeneous medium.
+        return None;
+    }
     if scene.media[id.0 as usize].emission == DVec3::ZERO || filled().next().is_none() {
         return None;
     }

@@ -2,7 +2,7 @@
 
 use super::Packed;
 use super::layout::*;
-use crate::scene::{Integrator, Lens, Scene};
+use crate::scene::{Integrator, Lens, Scene, Volume};
 
 /// Constants of the kernel, decided once for a scene. Each becomes a `const` of `features.glsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +21,12 @@ pub struct Features {
     pub emission: bool,
     /// A medium that emits and is sampled as a light.
     pub volume_lights: bool,
+    /// A medium whose coefficients depend on the place; shadow rays then go from boundary to boundary in order.
+    pub grids: bool,
+    /// A medium whose extinction coefficient comes from voxels.
+    pub voxels: bool,
+    /// A medium whose extinction coefficient falls with height.
+    pub heights: bool,
     /// A surface that rays cross without an event.
     pub boundaries: bool,
     /// Spheres among the primitives.
@@ -108,12 +114,19 @@ impl Features {
         let max_depth = max_depth.unwrap_or(u32::MAX);
         Features {
             media,
-            chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x)),
+            chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x))
+                || scene.media.iter().any(|medium| match &medium.volumes.sigma_t {
+                    Some(Volume::Grid(field)) => field.grid.channels() == 3,
+                    _ => false,
+                }),
             henyey_greenstein: packed.media.iter().any(|medium| medium.g != 0.0),
             equiangular: packed.media.iter().any(|medium| medium.equiangular > 0.0),
             phases: packed.media.iter().any(|medium| medium.phase != 0),
             emission,
             volume_lights: kind(LIGHT_VOLUME),
+            grids: media && packed.media.iter().any(|medium| medium.grids != 0),
+            voxels: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_VOXELS != 0),
+            heights: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_HEIGHT != 0),
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
             spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
             area_lights,
@@ -169,6 +182,9 @@ impl Features {
             phases: true,
             emission: true,
             volume_lights: true,
+            grids: true,
+            voxels: true,
+            heights: true,
             boundaries: true,
             spheres: true,
             area_lights: true,
@@ -210,6 +226,9 @@ impl Features {
             ("HAS_PHASES", self.phases),
             ("HAS_EMISSION", self.emission),
             ("HAS_VOLUME_LIGHTS", self.volume_lights),
+            ("HAS_GRIDS", self.grids),
+            ("HAS_VOXELS", self.voxels),
+            ("HAS_HEIGHTS", self.heights),
             ("HAS_BOUNDARIES", self.boundaries),
             ("HAS_SPHERES", self.spheres),
             ("HAS_AREA_LIGHTS", self.area_lights),

@@ -1,7 +1,7 @@
 //! How distances are sampled in each medium.
 
 use super::frame::{Bounds, Frame};
-use super::layout::{LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, Light, Medium};
+use super::layout::{LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, Light, MEDIUM_HEIGHT, MEDIUM_VOXELS, Medium};
 use super::nesting::Nesting;
 use crate::scene::{MediumId, Scene};
 
@@ -19,6 +19,10 @@ pub fn choose_equiangular(scene: &Scene, nesting: &Nesting, frame: &Frame, light
         return;
     }
     for (index, medium) in media.iter_mut().enumerate().skip(1) {
+        // Where the density depends on the place, it decides where light is scattered.
+        if medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT) != 0 {
+            continue;
+        }
         let id = MediumId(index as u32 - 1);
         let filled = scene.filled_with(id);
         let bounds = filled.fold(Bounds::EMPTY, |bounds, shape| bounds.union(Bounds::of(&shape.geometry)));

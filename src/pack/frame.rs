@@ -20,9 +20,9 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The frame of a scene. Without any shape the camera, the point lights and the spots span it.
+    /// The frame of a scene: of its shapes, and the voxels of a scene-wide medium. Without any shape the camera, the point lights and the spots span it.
     pub fn of(scene: &Scene) -> Frame {
-        let mut bounds = Bounds::EMPTY;
+        let mut bounds = super::grid::bounds(scene);
         for shape in &scene.shapes {
             bounds = bounds.union(Bounds::of(&shape.geometry));
         }

@@ -159,7 +159,7 @@ gpu_struct! {
 }
 
 gpu_struct! {
-    /// A homogeneous medium. Entry 0 of the table is vacuum.
+    /// A medium. Entry 0 of the table is vacuum.
     pub struct Medium {
         /// Extinction coefficient, 1/canonical unit.
         sigma_t: Vec3,
@@ -180,8 +180,9 @@ gpu_struct! {
         equiangular: f32,
         /// Share of the emission that is counted where flights end; the rest is counted along the way. In \[0, 1).
         collision_share: f32,
-        /// Fills the sixteen bytes.
-        unused: u32,
+        /// 0: homogeneous. Else the index plus one of the first of three grids (low 24 bits), factors of `sigma_t`, `albedo` and
+        /// `emission`, and the `MEDIUM_` bits that say which of these there are.
+        grids: u32,
     }
 }
 
@@ -258,6 +259,51 @@ gpu_struct! {
         unused_1: u32,
         /// Fills the sixteen bytes.
         unused_2: u32,
+    }
+}
+
+gpu_struct! {
+    /// A field in space, a factor of a medium's coefficient: voxels in a box, or a density that falls with height, which has no
+    /// more than the first row.
+    pub struct Grid {
+        /// The first coordinate in the unit cube of the voxels is `row_x · p + shift_x`. Of a height: that over its base, in units of
+        /// the scale height.
+        row_x: Vec3,
+        /// See `row_x`.
+        shift_x: f32,
+        /// Of the second coordinate.
+        row_y: Vec3,
+        /// See `row_y`.
+        shift_y: f32,
+        /// Of the third coordinate.
+        row_z: Vec3,
+        /// See `row_z`.
+        shift_z: f32,
+        /// Voxels along the first coordinate, which grows fastest.
+        size_x: u32,
+        /// Voxels along the second coordinate.
+        size_y: u32,
+        /// Voxels along the third coordinate.
+        size_z: u32,
+        /// The `GRID_` bits.
+        flags: u32,
+        /// Of an extinction coefficient: cells along the first coordinate.
+        cells_x: u32,
+        /// Cells along the second coordinate.
+        cells_y: u32,
+        /// Cells along the third coordinate.
+        cells_z: u32,
+        /// Index of the first voxel's first number among the values.
+        first_value: u32,
+        /// Index of the first cell's first number among the values. A cell has four: the largest, the smallest and the mean
+        /// extinction coefficient in it, 1/canonical unit, and the rate of tentative collisions, no less than the first.
+        first_cell: u32,
+        /// Fills the sixteen bytes.
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
+        /// Fills the sixteen bytes.
+        unused_3: u32,
     }
 }
 
@@ -476,6 +522,22 @@ pub const TEXTURE_SKY: u32 = 255;
 pub const LIGHT_VOLUME: u32 = 8;
 /// [`Light::kind`]: a parallelogram whose edges are perpendicular, sampled by solid angle.
 pub const LIGHT_RECTANGLE: u32 = 9;
+/// Bit 0 of [`Grid::flags`]: the voxel in which a point lies counts alone.
+pub const GRID_NEAREST: u32 = 1;
+/// Bit 1: outside of the unit cube the voxels are repeated, mirrored every other time.
+pub const GRID_MIRROR: u32 = 2;
+/// Bit 2: outside of the unit cube the voxels at its faces go on. With neither bit, the voxels are repeated.
+pub const GRID_CLAMP: u32 = 4;
+/// Bit 3: voxels have three numbers.
+pub const GRID_RGB: u32 = 8;
+/// [`Medium::grids`]: voxels are a factor of the extinction coefficient.
+pub const MEDIUM_VOXELS: u32 = 1 << 24;
+/// [`Medium::grids`]: the extinction coefficient falls with height.
+pub const MEDIUM_HEIGHT: u32 = 1 << 25;
+/// [`Medium::grids`]: voxels are a factor of the albedo.
+pub const MEDIUM_ALBEDO_GRID: u32 = 1 << 26;
+/// [`Medium::grids`]: voxels are a factor of the emission.
+pub const MEDIUM_EMISSION_GRID: u32 = 1 << 27;
 /// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
 pub const TILE: u32 = 8;
 /// Longest distance; rays that end nowhere end here.
@@ -490,6 +552,7 @@ pub fn glsl() -> String {
         Phase::glsl(),
         Corners::glsl(),
         Texture::glsl(),
+        Grid::glsl(),
         Light::glsl(),
         Params::glsl(),
         Dispatch::glsl(),
@@ -537,6 +600,14 @@ pub fn glsl() -> String {
         ("LIGHT_TEXTURE_SHIFT", LIGHT_TEXTURE_SHIFT),
         ("LIGHT_VOLUME", LIGHT_VOLUME),
         ("LIGHT_RECTANGLE", LIGHT_RECTANGLE),
+        ("GRID_NEAREST", GRID_NEAREST),
+        ("GRID_MIRROR", GRID_MIRROR),
+        ("GRID_CLAMP", GRID_CLAMP),
+        ("GRID_RGB", GRID_RGB),
+        ("MEDIUM_VOXELS", MEDIUM_VOXELS),
+        ("MEDIUM_HEIGHT", MEDIUM_HEIGHT),
+        ("MEDIUM_ALBEDO_GRID", MEDIUM_ALBEDO_GRID),
+        ("MEDIUM_EMISSION_GRID", MEDIUM_EMISSION_GRID),
         ("TILE", TILE),
         ("BLOCK_SAMPLES", crate::render::BLOCK_SAMPLES),
         ("POINT_BITS", sobol::POINT_BITS),

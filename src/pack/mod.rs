@@ -9,6 +9,7 @@ pub mod features;
 pub mod filter;
 mod flight;
 pub mod frame;
+pub mod grid;
 pub mod immediate;
 pub mod layout;
 pub mod lights;
@@ -23,6 +24,7 @@ pub mod texture;
 use bvh::Bvh;
 use features::Features;
 use frame::Frame;
+use grid::GridTable;
 use layout::*;
 use lights::LightTable;
 use nesting::Nesting;
@@ -51,6 +53,8 @@ pub struct Packed {
     pub corners: Vec<Corners>,
     /// Images and patterns.
     pub textures: Vec<Texture>,
+    /// Fields in space: three for each medium that has any.
+    pub grids: Vec<Grid>,
     /// Numbers of any length that the other tables refer to: pixels, tabulated functions, distributions.
     pub values: Vec<f32>,
     /// The rest.
@@ -148,7 +152,9 @@ impl Packed {
             return Err(PackError::TooManyMedia(scene.media.len()));
         }
         let (mut phases, mut values) = (Vec::new(), Vec::new());
-        let mut media = pack_media(scene, &frame, nesting.world, &mut phases, &mut values)?;
+        let mut grids = GridTable::default();
+        let mut media = pack_media(scene, &frame, nesting.world, &mut phases, &mut grids, &mut values)?;
+        let grids = grids.grids;
         let mut surfaces = Vec::with_capacity(scene.shapes.len());
         let mut primitives = Vec::new();
         let mut lights = LightTable::default();
@@ -225,6 +231,7 @@ impl Packed {
             phases,
             corners,
             textures,
+            grids,
             values,
             params,
             features,
@@ -288,6 +295,9 @@ const EMPTY_FEATURES: Features = Features {
     phases: false,
     emission: false,
     volume_lights: false,
+    grids: false,
+    voxels: false,
+    heights: false,
     boundaries: false,
     spheres: false,
     area_lights: false,
@@ -335,6 +345,7 @@ fn pack_media(
     frame: &Frame,
     world: Option<MediumId>,
     phases: &mut Vec<layout::Phase>,
+    grids: &mut GridTable,
     values: &mut Vec<f32>,
 ) -> Result<Vec<Medium>, PackError> {
     let mut media = vec![Medium::default()];
@@ -349,7 +360,18 @@ fn pack_media(
         let albedo = medium.albedo.as_vec3();
         let (emission, collision_share) = emission::pack(scene, frame, id, world == Some(id))?;
         let least_sigma_t = sigma_t.min_element();
-        media.push(Medium { sigma_t, g, albedo, phase, emission, collision_share, least_sigma_t, ..Medium::default() });
+        let grids = grids.add(medium, sigma_t, frame, values)?;
+        media.push(Medium {
+            sigma_t,
+            g,
+            albedo,
+            phase,
+            emission,
+            collision_share,
+            least_sigma_t,
+            grids,
+            ..Medium::default()
+        });
     }
     Ok(media)
 }

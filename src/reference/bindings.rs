@@ -1,5 +1,6 @@
 //! Mirror of `shaders/lib/bindings.glsl`: the tables of the scene, their numbers widened to double precision.
 
+use super::grid::Grid;
 use crate::pack::features::Features;
 use crate::pack::{Packed, layout, sobol};
 use glam::{DVec2, DVec3};
@@ -25,7 +26,9 @@ pub struct Tables {
     pub corners: Vec<layout::Corners>,
     /// Images and patterns.
     pub textures: Vec<Texture>,
-    /// Pixels, tabulated functions, distributions.
+    /// Fields in space.
+    pub grids: Vec<Grid>,
+    /// Pixels, tabulated functions, distributions, voxels.
     pub values: Vec<f32>,
     /// Low-discrepancy points.
     pub points: Vec<[u32; 2]>,
@@ -87,6 +90,7 @@ pub struct Medium {
     pub least_sigma_t: f64,
     pub equiangular: f64,
     pub collision_share: f64,
+    pub grids: u32,
 }
 
 /// See [`layout::Texture`].
@@ -174,6 +178,7 @@ impl Tables {
             phases: packed.phases.clone(),
             corners: packed.corners.clone(),
             textures: packed.textures.iter().map(Texture::from).collect(),
+            grids: packed.grids.iter().map(Grid::from).collect(),
             values: packed.values.clone(),
             points: sobol::points(),
             params: Params::from(&packed.params),
@@ -246,6 +251,7 @@ impl From<&layout::Medium> for Medium {
             least_sigma_t: f64::from(from.least_sigma_t),
             equiangular: f64::from(from.equiangular),
             collision_share: f64::from(from.collision_share),
+            grids: from.grids,
         }
     }
 }

@@ -11,6 +11,7 @@ pub mod camera;
 pub mod equiangular;
 pub mod film;
 pub mod filter;
+pub mod grid;
 pub mod light;
 pub mod math;
 pub mod medium;

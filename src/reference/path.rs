@@ -8,8 +8,11 @@ use super::filter::sample_filter;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::channel_weights;
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
-use super::path_flight::{end_flight, enter_medium, flight_point, flight_side, free_way, near_distance};
-use super::path_lights::{add_emission, add_medium_emission, add_sky, sample_light};
+use super::path_flight::{
+    albedo_factor, end_flight, end_height_flight, end_voxel_flight, enter_medium, flight_point, flight_side, free_way,
+    near_distance, pass_medium,
+};
+use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
@@ -23,8 +26,8 @@ use super::path_vertex::{
 };
 use super::ray::offset_distance;
 use crate::pack::layout::{
-    LIGHT_VOLUME, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED, SURFACE_MASK, SURFACE_ORIENTED,
-    SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
+    LIGHT_VOLUME, MEDIUM_HEIGHT, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED, SURFACE_MASK,
+    SURFACE_ORIENTED, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
 };
 use glam::{DVec2, DVec3, UVec2, Vec4Swizzles};
 
@@ -136,6 +139,14 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
         (vertex.in_medium || bsdf_has_density(&vertex.surface)) && sample_light(tables, path, vertex, u.xy(), u.zw());
     path.next_direction = next.direction;
     path.next_medium = medium_towards(tables, vertex, path.medium, next.direction);
+    if tables.features.grids && path.shadow {
+        path.medium = path.light_medium;
+        path.tau_rgb = DVec3::ZERO;
+        path.tau_mean = DVec3::ZERO;
+        path.light_passes = DVec3::ONE;
+        path.passed = 1.0;
+        path.collisions = 0;
+    }
     path.throughput *= next.weight;
     path.pdf = next.pdf;
     path.eta_scale *= next.eta * next.eta;
@@ -218,9 +229,19 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     let t = if surface_hit { hit.t } else { path.t_max };
 
     let medium = *medium_at(tables, path.medium);
-    let end = end_flight(tables, path, &medium, t, surface_hit);
-    let flown = if end.scatters { free_way(path, &medium) } else { t - path.t_min };
-    add_medium_emission(tables, path, &medium, flown, end.scatters);
+    let voxels = medium.grids & MEDIUM_VOXELS != 0;
+    let end = if voxels {
+        let shines = emitters_seen(tables, path);
+        end_voxel_flight(tables, path, &medium, t, shines)
+    } else if medium.grids & MEDIUM_HEIGHT != 0 {
+        end_height_flight(tables, path, &medium, t)
+    } else {
+        end_flight(tables, path, &medium, t, surface_hit)
+    };
+    if !voxels {
+        let flown = if end.scatters { free_way(path, &medium) } else { t - path.t_min };
+        add_medium_emission(tables, path, &medium, flown, end.scatters);
+    }
     if end.scatters {
         let point = flight_point(tables, path, flight_side(path, hit, end.way), end.way);
         path.offset = 0.0;
@@ -229,7 +250,7 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         let (axis, surface, incident) = (path.direction, Surface::default(), DVec3::ZERO);
         let Medium { g, phase, .. } = medium;
         let (tangent, normal) = (DVec3::ZERO, path.direction);
-        let albedo = end.weight;
+        let albedo = end.weight * albedo_factor(tables, &medium, point);
         let (in_medium, base, fade) = (true, axis, 0.0);
         return Some(Vertex {
             point,
@@ -247,9 +268,9 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         });
     }
     // The optical depth of the way through the medium since `t_min`.
-    let way = t - path.t_min;
-    path.tau_left -= way * medium.sigma_t[path.channel as usize];
-    path.tau_rgb += medium.sigma_t * way;
+    path.tau_left -= end.dense * medium.sigma_t[path.channel as usize];
+    path.tau_rgb += medium.sigma_t * end.dense;
+    path.tau_mean += medium.sigma_t * end.dense;
     if !surface_hit {
         add_sky(tables, path);
         path.alive = false;
@@ -302,11 +323,45 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     path.alive.then_some(vertex)
 }
 
-/// Adds what a shadow ray brings.
+/// Takes a shadow ray to the next boundary, or to its end; whether it has to go on from there.
+fn advance_shadow(tables: &Tables, path: &mut Path, hit: &mut Hit) -> bool {
+    let reaches = hit.primitive == NONE;
+    pass_medium(tables, path, if reaches { path.t_max } else { hit.t });
+    if max_component(path.light_passes) == 0.0 {
+        hit.blocked = true;
+        return false;
+    }
+    if reaches {
+        hit.medium = path.medium;
+        hit.passed = path.passed;
+        return false;
+    }
+    let primitive = tables.primitive(hit.primitive);
+    let surface = tables.surface_of(primitive);
+    if primitive.surface & PRIMITIVE_BOUNDARY == 0 {
+        let point = path.origin + path.direction * hit.t;
+        let place = Place { index: hit.primitive, point, barycentric: hit.barycentric };
+        path.passed *= 1.0 - opacity_at(tables, surface, &place);
+    }
+    let t_max = path.t_max;
+    cross_surface(tables, path, surface, hit);
+    path.t_max = t_max;
+    true
+}
+
+/// Adds what a shadow ray brings, or takes it further.
 fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
+    let mut hit = *hit;
+    if tables.features.grids && !hit.blocked && advance_shadow(tables, path, &mut hit) {
+        return;
+    }
     if !hit.blocked {
         let mut transmittance = exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO)) * hit.passed;
         let mut survives = channel_weights(path.light_channels).dot(transmittance);
+        if tables.features.grids {
+            transmittance = path.light_passes * exp_minus_rgb(path.tau_rgb) * hit.passed;
+            survives = hit.passed * channel_weights(path.light_channels).dot(exp_minus_rgb(path.tau_mean));
+        }
         let light = &tables.lights[path.light as usize];
         if light.kind == LIGHT_VOLUME {
             // The point lies in the sphere about the medium, but perhaps not in the medium itself.

@@ -2,12 +2,20 @@
 
 use super::bindings::{Light, Medium, Primitive, Tables};
 use super::equiangular::{equiangular_pdf, sample_equiangular, stretch_seen_from};
+use super::grid::{
+    Span, grid_local, grid_transmittance, grid_value, height_flight, height_length, start_grid_walk, stream_numbers,
+    walk_point, walk_to_collision,
+};
 use super::light::{is_local, plane_light_point};
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
-use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight};
-use super::path_state::{Hit, NONE, Path, choose_light, sample_set};
+use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight, survival_weight};
+use super::path_state::{FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, choose_light, medium_at, sample_set};
 use super::ray::{offset_distance, vertex_clearance};
-use crate::pack::layout::{LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_TRIANGLE, PRIMITIVE_SPHERE};
+use super::sampler::set_key;
+use crate::pack::layout::{
+    LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_TRIANGLE, MEDIUM_ALBEDO_GRID, MEDIUM_EMISSION_GRID, MEDIUM_HEIGHT,
+    MEDIUM_VOXELS, PRIMITIVE_SPHERE,
+};
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
 /// Sets of random numbers that choose what a segment's equiangular sampling goes by.
@@ -22,6 +30,8 @@ pub struct FlightEnd {
     pub way: f64,
     /// Of a path that scatters: albedo, transmittance and density of `t` together.
     pub weight: DVec3,
+    /// Density times length of the way, in units of the medium's `sigma_t`; 0 where voxels have been accounted for.
+    pub dense: f64,
 }
 
 /// A point of the light, if the light is somewhere.
@@ -39,8 +49,8 @@ pub fn free_way(path: &Path, medium: &Medium) -> f64 {
 
 /// Where the flight ends on a ray that meets a surface at `t_end`, or nothing before `t_end`.
 pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, surface: bool) -> FlightEnd {
-    let mut end =
-        FlightEnd { scatters: !surface && t_end < path.far_end, way: t_end - path.t_min, weight: medium.albedo };
+    let way = t_end - path.t_min;
+    let mut end = FlightEnd { scatters: !surface && t_end < path.far_end, way, weight: medium.albedo, dense: way };
     let sigma = medium.sigma_t[path.channel as usize];
     let length = t_end - path.t_min;
     let mixed = medium.equiangular > 0.0;
@@ -75,6 +85,93 @@ pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, sur
     let mixture = (1.0 - share) * weights.dot(collision) + share * weights.dot(ends) * density;
     end.weight = medium.albedo * collision / mixture;
     end
+}
+
+/// The same in a medium whose density falls with height.
+pub fn end_height_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64) -> FlightEnd {
+    let grid = &tables.grids[(medium.grids & 0xff_ffff) as usize - 1];
+    let span = Span { origin: path.origin, direction: path.direction, t_begin: path.t_min, t_end };
+    let dense = height_length(grid, &span);
+    let mut end = FlightEnd { scatters: false, way: t_end - path.t_min, weight: medium.albedo, dense };
+    let wanted = free_way(path, medium);
+    if wanted < dense {
+        end.scatters = true;
+        end.way = height_flight(grid, path.origin, path.direction, path.t_min, wanted).min(end.way);
+        let tau = path.tau_rgb + medium.sigma_t * wanted;
+        end.weight = scatter_weight(channel_weights(path.throughput), tau, medium.sigma_t, medium.albedo);
+    }
+    end
+}
+
+/// What a medium emits at a point, per unit of length.
+fn emission_at(tables: &Tables, medium: &Medium, point: DVec3) -> DVec3 {
+    if medium.grids & MEDIUM_EMISSION_GRID == 0 {
+        return medium.emission;
+    }
+    let grid = &tables.grids[(medium.grids & 0xff_ffff) as usize + 1];
+    let local = grid_local(grid, point);
+    let outside = local.cmplt(DVec3::ZERO).any() || local.cmpgt(DVec3::ONE).any();
+    if outside { DVec3::ZERO } else { medium.emission * grid_value(&tables.values, grid, local) }
+}
+
+/// The same through voxels, by delta tracking with the rates of their cells. Adds what is emitted, where `shines`.
+pub fn end_voxel_flight(tables: &Tables, path: &mut Path, medium: &Medium, t_end: f64, shines: bool) -> FlightEnd {
+    let grid = &tables.grids[(medium.grids & 0xff_ffff) as usize - 1];
+    let values = &tables.values;
+    let mut end = FlightEnd { scatters: false, way: t_end - path.t_min, weight: medium.albedo, dense: 0.0 };
+    path.throughput *= survival_weight(channel_weights(path.throughput), path.tau_rgb);
+    path.tau_rgb = DVec3::ZERO;
+    let key = set_key(tables.params.seed, path.pixel, FLIGHT_STREAMS + path.segment, path.sample_index);
+    let mut walk = start_grid_walk(grid, path.origin, path.direction, path.t_min, t_end);
+    let mut tau = path.tau_left;
+    while walk_to_collision(values, grid, false, &mut walk, &mut tau) {
+        let u = stream_numbers(key, path.collisions);
+        path.collisions += 1;
+        let sigma = medium.sigma_t * grid_value(values, grid, walk_point(grid, &walk));
+        if shines {
+            let emission = emission_at(tables, medium, path.origin + path.direction * walk.t);
+            path.radiance += path.throughput * emission / walk.rate;
+        }
+        end.scatters = u.x * walk.rate < sigma[path.channel as usize];
+        let share = if end.scatters { sigma } else { (DVec3::splat(walk.rate) - sigma).max(DVec3::ZERO) };
+        path.throughput *= share * (path.throughput.element_sum() / path.throughput.dot(share));
+        tau = minus_log_1m(u.y);
+        if end.scatters {
+            end.way = walk.t - path.t_min;
+            break;
+        }
+    }
+    path.tau_left = tau;
+    path.tau_mean += walk.mean;
+    end
+}
+
+/// The albedo's factor at the end of a flight.
+pub fn albedo_factor(tables: &Tables, medium: &Medium, point: DVec3) -> DVec3 {
+    if medium.grids & MEDIUM_ALBEDO_GRID == 0 {
+        return DVec3::ONE;
+    }
+    let grid = &tables.grids[(medium.grids & 0xff_ffff) as usize];
+    grid_value(&tables.values, grid, grid_local(grid, point))
+}
+
+/// A stretch of a shadow ray from `t_min` to `t_end`, within one medium.
+pub fn pass_medium(tables: &Tables, path: &mut Path, t_end: f64) {
+    let medium = medium_at(tables, path.medium);
+    let span = Span { origin: path.origin, direction: path.direction, t_begin: path.t_min, t_end };
+    let grid = || &tables.grids[(medium.grids & 0xff_ffff) as usize - 1];
+    if medium.grids & MEDIUM_VOXELS != 0 {
+        let key = set_key(tables.params.seed, path.pixel, SHADOW_STREAMS + path.segment, path.sample_index);
+        let index = &mut path.collisions;
+        let (passes, mean) = grid_transmittance(&tables.values, grid(), medium.sigma_t, &span, key, index);
+        path.light_passes *= passes;
+        path.tau_mean += mean;
+        return;
+    }
+    let height = medium.grids & MEDIUM_HEIGHT != 0;
+    let dense = if height { height_length(grid(), &span) } else { t_end - path.t_min };
+    path.tau_rgb += medium.sigma_t * dense;
+    path.tau_mean += medium.sigma_t * dense;
 }
 
 /// How near to a surface a point of a flight may round to its other side, with some room for rays that graze it.

@@ -2,13 +2,14 @@
 
 use super::bindings::{Light, Medium, Primitive, Tables, Texture};
 use super::bsdf::BsdfSample;
+use super::grid::{clip_to_grid, grid_local, grid_value};
 use super::light::{
     LightSample, area_pdf, rectangle_light_pdf, sample_directional_light, sample_plane_light, sample_point_light,
     sample_rectangle_light, sample_sphere_light, sample_spot_light, sample_volume_light, sphere_light_pdf,
     volume_light_pdf,
 };
 use super::math::max_component;
-use super::medium::{channel_weights, emitting_length, emitting_length_rgb};
+use super::medium::{channel_weights, emitting_length, emitting_length_rgb, survival_weight};
 use super::path_state::{
     EMISSION_SETS, INFINITE_DISTANCE, Path, choose_light, sample_set, survival, survived_throughput,
 };
@@ -16,7 +17,7 @@ use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin,
 use super::sky::{SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
 use crate::pack::layout::{
     LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_SPOT,
-    LIGHT_TEXTURE_SHIFT, LIGHT_VOLUME,
+    LIGHT_TEXTURE_SHIFT, LIGHT_VOLUME, MEDIUM_EMISSION_GRID,
 };
 use glam::{DVec2, DVec3};
 
@@ -64,7 +65,7 @@ pub fn add_sky(tables: &Tables, path: &mut Path) {
             None => (light.radiance, path.pdf),
         };
         let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
-        let weight = scattering_mis_weight(tables, path, survival(path), light_pdf);
+        let weight = scattering_mis_weight(tables, path, survival(tables, path), light_pdf);
         path.radiance += survived_throughput(path) * radiance * weight;
     }
 }
@@ -83,13 +84,32 @@ pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: 
         _ => area_pdf(light.area, t, cos_light),
     };
     let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
-    let weight = scattering_mis_weight(tables, path, survival(path), light_pdf);
+    let weight = scattering_mis_weight(tables, path, survival(tables, path), light_pdf);
     path.radiance += survived_throughput(path) * light.radiance * weight;
+}
+
+/// Adds what voxels emit along the flight through a homogeneous medium: one point stands for the way through them.
+fn add_field_emission(tables: &Tables, path: &mut Path, medium: &Medium, way: f64) {
+    let grid = &tables.grids[(medium.grids & 0xff_ffff) as usize + 1];
+    let clipped = clip_to_grid(grid, path.origin, path.direction, path.t_min, path.t_min + way);
+    if clipped.x >= clipped.y {
+        return;
+    }
+    let u = sample_set(tables, path, EMISSION_SETS + path.segment).x;
+    let t = clipped.x + u * (clipped.y - clipped.x);
+    let local = grid_local(grid, path.origin + path.direction * t);
+    let emitted = medium.emission * grid_value(&tables.values, grid, local) * (clipped.y - clipped.x);
+    let survived = survival_weight(channel_weights(path.throughput), path.tau_rgb + medium.sigma_t * (t - path.t_min));
+    path.radiance += path.throughput * emitted * survived;
 }
 
 /// Adds what a medium emits along the flight through it, from `t_min` on.
 pub fn add_medium_emission(tables: &Tables, path: &mut Path, medium: &Medium, way: f64, ended: bool) {
     if max_component(medium.emission) == 0.0 || !emitters_seen(tables, path) {
+        return;
+    }
+    if medium.grids & MEDIUM_EMISSION_GRID != 0 {
+        add_field_emission(tables, path, medium, way);
         return;
     }
     let (share, sigma_t) = (medium.collision_share, medium.sigma_t);

@@ -58,7 +58,23 @@ pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit:
     // twice.
     let begins = t > path.t_min || (t == path.t_min && index > path.last && path.last != NONE);
     let begins = begins && index != path.left;
-    if path.shadow {
+    if tables.features.grids && path.shadow {
+        // In order: what lies between boundaries is not known before.
+        let counts = begins && t < path.t_max && primitive.light != path.light + 1;
+        let mut passes = primitive.surface & PRIMITIVE_BOUNDARY != 0;
+        let surface = tables.surface_of(primitive);
+        if counts && !passes && surface.flags & SURFACE_MASK != 0 {
+            let place = Place { index, point: path.origin + path.direction * t, barycentric };
+            passes = opacity_at(tables, surface, &place) < 1.0;
+        }
+        hit.blocked |= counts && !passes;
+        if counts && passes && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE)) {
+            hit.t = t;
+            hit.primitive = index;
+            hit.along_normal = along_normal;
+            hit.barycentric = barycentric;
+        }
+    } else if path.shadow {
         let mut boundary = primitive.surface & PRIMITIVE_BOUNDARY != 0;
         let counts = begins && t < path.t_max;
         // The light itself is not in the way of its light.

@@ -2,10 +2,10 @@
 
 use super::bindings::{Medium, Tables};
 use super::light::{alias_keeps, alias_line};
-use super::math::minus_log_1m;
+use super::math::{exp_minus_rgb, minus_log_1m};
 use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
 use super::sampler::{lens_key, point_index, set_key, shifted_point};
-use crate::pack::layout;
+use crate::pack::layout::{self, MEDIUM_HEIGHT, MEDIUM_VOXELS};
 use crate::pack::sobol::{LENS_SET, SOBOL_SETS};
 use glam::{DVec2, DVec3, DVec4};
 
@@ -18,6 +18,11 @@ const MAX_FLIGHT_TAU: f64 = 16.7;
 
 /// Sets of the numbers that choose points of emission, one for each segment: beyond all others.
 pub const EMISSION_SETS: u32 = 0x8000_0000;
+
+/// Streams of numbers for tentative collisions, one for each segment's flight.
+pub const FLIGHT_STREAMS: u32 = 0xc000_0000;
+/// The same for the shadow ray at the segment's end.
+pub const SHADOW_STREAMS: u32 = 0xe000_0000;
 
 /// A path between two rays.
 #[derive(Clone, Copy, Debug, Default)]
@@ -72,6 +77,14 @@ pub struct Path {
     pub crossings: u32,
     /// Where the far clip plane ends a camera ray.
     pub far_end: f64,
+    /// Numbers of the stream that are used up. This and the next three: where media are not homogeneous.
+    pub collisions: u32,
+    /// Optical depth from the last event to `t_min` as the weights of light sampling see it.
+    pub tau_mean: DVec3,
+    /// Channel weights at the beginning of the segment.
+    pub segment_weights: DVec3,
+    /// Shadow rays: estimate of the transmittance of voxels up to `t_min`.
+    pub light_passes: DVec3,
     /// Where the path goes on behind a shadow ray.
     pub next_direction: DVec3,
     /// What arrives if nothing is in the way.
@@ -146,6 +159,9 @@ pub fn medium_at(tables: &Tables, medium: u32) -> &Medium {
 /// Distance to the end of the flight with the extinction that holds from `t_min` on.
 pub fn flight_end(tables: &Tables, path: &Path) -> f64 {
     let medium = medium_at(tables, path.medium);
+    if medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT) != 0 {
+        return path.far_end;
+    }
     let flight = if medium.equiangular > 0.0 {
         free_flight(MAX_FLIGHT_TAU, medium.least_sigma_t)
     } else {
@@ -162,11 +178,17 @@ pub fn begin_segment(tables: &Tables, path: &mut Path, u: DVec2) {
     path.tau_left = minus_log_1m(u.x);
     path.tau_rgb = DVec3::ZERO;
     path.channel = sample_channel(channel_weights(path.throughput), u.y);
+    path.collisions = 0;
+    path.tau_mean = DVec3::ZERO;
+    path.segment_weights = channel_weights(path.throughput);
     path.t_max = flight_end(tables, path);
 }
 
 /// Probability that the flight got as far as it did, through media and masks.
-pub fn survival(path: &Path) -> f64 {
+pub fn survival(tables: &Tables, path: &Path) -> f64 {
+    if tables.features.grids {
+        return path.passed * path.segment_weights.dot(exp_minus_rgb(path.tau_mean));
+    }
     path.passed * survival_probability(channel_weights(path.throughput), path.tau_rgb)
 }
 

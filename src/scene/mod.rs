@@ -30,6 +30,7 @@ mod output;
 mod phase;
 pub mod spectrum;
 mod texture;
+pub mod volume;
 
 pub use bitmap::Bitmap;
 pub use bsdf::{Bsdf, Distribution, Relief, ReliefMap, Roughness};
@@ -38,6 +39,7 @@ pub use filter::ReconstructionFilter;
 pub use output::{Aov, AovKind, Colors, PixelFormat};
 pub use phase::Phase;
 pub use texture::{Filter, Texture, Wrap};
+pub use volume::{Grid, GridVolume, HeightVolume, Volume, Volumes};
 
 /// Index of a medium in [`Scene::media`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -303,7 +305,7 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// A homogeneous participating medium.
+/// A participating medium: homogeneous, unless `volumes` says what depends on the place.
 #[derive(Clone, Debug)]
 pub struct Medium {
     /// For messages.
@@ -317,12 +319,14 @@ pub struct Medium {
     /// Radiance that is added per unit length in every direction, W/(m² sr) per scene unit, ≥ 0. It does not depend on
     /// `sigma_t`: a medium that neither absorbs nor scatters may glow.
     pub emission: DVec3,
+    /// Factors of the coefficients that depend on the place.
+    pub volumes: Volumes,
 }
 
 impl Medium {
     /// A medium from its extinction coefficient and albedo, which does not emit.
     pub fn new(name: &str, sigma_t: DVec3, albedo: DVec3, phase: Phase) -> Self {
-        Medium { name: name.to_owned(), sigma_t, albedo, phase, emission: DVec3::ZERO }
+        Medium { name: name.to_owned(), sigma_t, albedo, phase, emission: DVec3::ZERO, volumes: Volumes::default() }
     }
 }
 

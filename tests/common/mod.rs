@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test file uses a part of this")]
 
 pub mod comparison;
+pub mod fields;
 pub mod images;
 pub mod phases;
 pub mod random;

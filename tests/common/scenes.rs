@@ -1,5 +1,6 @@
 //! Tiny scenes, built in Rust.
 
+use super::fields;
 use glam::{DAffine2, DMat3, DMat4, DVec2, DVec3};
 use std::sync::Arc;
 use tyndall::pack::Packed;
@@ -83,7 +84,8 @@ pub fn icosphere(level: u32) -> Mesh {
     Mesh { positions, triangles, ..Mesh::default() }
 }
 
-fn phase(g: f64) -> Phase {
+/// Henyey and Greenstein's phase function.
+pub fn phase(g: f64) -> Phase {
     if g == 0.0 { Phase::Isotropic } else { Phase::HenyeyGreenstein { g } }
 }
 
@@ -93,7 +95,7 @@ pub fn gray(sigma_t: f64, albedo: f64, g: f64) -> Medium {
 }
 
 /// The walls of an open box from −1 to 1, seen from +z.
-fn walls(scene: &mut Scene) {
+pub fn walls(scene: &mut Scene) {
     let (white, red, green) = (v(0.7, 0.7, 0.65), v(0.6, 0.1, 0.05), v(0.1, 0.5, 0.1));
     let (x, y, z) = (DVec3::X * 2.0, DVec3::Y * 2.0, DVec3::Z * 2.0);
     scene.shapes.push(Shape::diffuse("floor", quad(v(-1.0, -1.0, 1.0), x, -z), white));
@@ -105,11 +107,13 @@ fn walls(scene: &mut Scene) {
     scene.shapes.push(right);
 }
 
-fn lamp() -> Shape {
+/// A lamp under the ceiling.
+pub fn lamp() -> Shape {
     Shape::lamp("lamp", quad(v(-0.3, 0.98, -0.3), DVec3::X * 0.6, DVec3::Z * 0.6), v(12.0, 10.0, 6.0))
 }
 
-fn camera(distance: f64) -> Camera {
+/// A camera before the origin.
+pub fn camera(distance: f64) -> Camera {
     Camera::look_at(v(0.05, 0.1, distance), DVec3::ZERO, DVec3::Y, 42.0)
 }
 
@@ -193,7 +197,7 @@ pub fn sunny() -> Arc<Bitmap> {
 }
 
 /// A floor, a ball of haze and a metal one.
-fn still_life(fog: bool) -> Scene {
+pub fn still_life(fog: bool) -> Scene {
     let mut scene = Scene::new(camera(4.0), Film::new(24, 24));
     let floor = quad(v(-3.0, -1.0, 3.0), DVec3::X * 6.0, DVec3::NEG_Z * 6.0);
     scene.shapes.push(Shape::diffuse("floor", floor, v(0.5, 0.6, 0.7)));
@@ -216,7 +220,7 @@ fn still_life(fog: bool) -> Scene {
 }
 
 /// A spot and parallel light, through fog that ends somewhere.
-fn spot_and_directional() -> Scene {
+pub fn spot_and_directional() -> Scene {
     let mut scene = still_life(true);
     let (position, direction) = (v(1.0, 1.5, 1.0), v(-0.8, -1.0, -0.7).normalize());
     let intensity = v(8.0, 6.0, 5.0);
@@ -394,7 +398,7 @@ pub fn metals() -> Scene {
     scene
 }
 
-/// All scenes of this file, by name.
+/// All scenes of this file, and those of fields in space, by name.
 pub fn all() -> Vec<(&'static str, Scene)> {
     vec![
         ("gray box", gray_box()),
@@ -408,6 +412,9 @@ pub fn all() -> Vec<(&'static str, Scene)> {
         ("glow", glow()),
         ("surfaces", surfaces()),
         ("metals", metals()),
+        ("voxels", fields::voxels()),
+        ("smoke", fields::smoke()),
+        ("height fog", fields::height_fog()),
     ]
 }
 

@@ -284,7 +284,7 @@ fn materials_and_media() {
         table(&[(&inside(text), &[part])]);
     }
     table(&[
-        ("‸<medium type=\"heterogeneous\" id=\"m\"/>", &["accepted types: homogeneous"]),
+        ("‸<medium type=\"cloud\" id=\"m\"/>", &["accepted types: homogeneous, heterogeneous"]),
         (
             "‸<medium type=\"homogeneous\"><float name=\"sigma_t\" value=\"1e300\"/><float name=\"scale\" value=\"1e300\"/></medium>",
             &["overflows"],

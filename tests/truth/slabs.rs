@@ -35,12 +35,12 @@ impl Slab {
         Slab { tau, albedo, g, n, scale: 1.0, half_width: 12.0 * tau + 40.0 / (1.0 - g) + 20.0 }
     }
 
-    fn half(&self) -> f64 {
+    pub fn half(&self) -> f64 {
         self.half_width * self.scale
     }
 
     /// Height of its upper face; it lies around the origin, where single precision is best.
-    fn top(&self) -> f64 {
+    pub fn top(&self) -> f64 {
         self.tau / 2.0 * self.scale
     }
 

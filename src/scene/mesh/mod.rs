@@ -123,6 +123,19 @@ pub fn rectangle() -> Mesh {
     }
 }
 
+/// The image of the unit cube, eight vertices with normals outwards.
+pub fn box_of(to_world: DMat4) -> Mesh {
+    let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+    const FACES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let mirrored = to_world.determinant() < 0.0;
+    let turn = |[a, b, c]: [u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+    Mesh {
+        positions: (0..8).map(|k| to_world.transform_point3(corner(k))).collect(),
+        triangles: FACES.iter().flat_map(|&[a, b, c, d]| [turn([a, b, c]), turn([a, c, d])]).collect(),
+        ..Mesh::default()
+    }
+}
+
 /// The cube \[-1, 1\]³, whose normals point outwards. Each face has four vertices of its own, whose texture coordinates
 /// are (0, 1), (1, 1), (1, 0) and (0, 0), as Mitsuba 3.9.1 has them.
 pub fn cube() -> Mesh {

@@ -8,8 +8,11 @@ use super::mesh_file::MeshKey;
 use super::props::{Child, Props};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
 use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture};
-use crate::scene::mesh::FileMesh;
-use crate::scene::{Aov, Bitmap, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape};
+use crate::scene::mesh::{self, FileMesh};
+use crate::scene::{
+    Aov, Bitmap, Geometry, Grid, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape, Volume,
+};
+use glam::DVec3;
 
 /// What the converters of single objects share.
 pub(super) struct Context<'a> {
@@ -20,6 +23,8 @@ pub(super) struct Context<'a> {
     pub aovs: Vec<Aov>,
     /// Images by file, and whether they are raw.
     pub images: HashMap<(PathBuf, bool), Arc<Bitmap>>,
+    /// Voxels by file, and the box that the file has for them.
+    pub grids: HashMap<PathBuf, (Arc<Grid>, [DVec3; 2])>,
     /// Meshes as they are in their files.
     pub meshes: HashMap<MeshKey, Arc<FileMesh>>,
     medium_ids: HashMap<ObjectId, MediumId>,
@@ -49,13 +54,14 @@ impl<'a> Context<'a> {
 /// The scene that a tree describes.
 pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     let root = &tree.objects[0];
-    let (images, meshes, medium_ids) = (HashMap::new(), HashMap::new(), HashMap::new());
+    let (images, grids, meshes, medium_ids) = (HashMap::new(), HashMap::new(), HashMap::new(), HashMap::new());
     let mut context = Context {
         tree,
         warnings: Vec::new(),
         media: Vec::new(),
         aovs: Vec::new(),
         images,
+        grids,
         meshes,
         medium_ids,
         open_bsdfs: Vec::new(),
@@ -92,7 +98,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     for child in props.children(Kind::Emitter) {
         lights.push(emitter::light(&mut context, child)?);
     }
-    declarations(&mut context, &props)?;
+    declarations(&mut context, &props, &mut shapes)?;
     props.finish()?;
 
     if let Some(child) = integrator_child {
@@ -119,12 +125,21 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
 }
 
 /// Media, BSDFs and textures that stand directly in the scene are there to be referred to. They are checked even if nobody does,
-/// since a fault in them is one that waits.
-fn declarations<'a>(context: &mut Context<'a>, props: &Props<'a>) -> Result<(), SceneError> {
+/// since a fault in them is one that waits. A medium of voxels that nobody refers to fills the box of its voxels.
+fn declarations<'a>(context: &mut Context<'a>, props: &Props<'a>, shapes: &mut Vec<Shape>) -> Result<(), SceneError> {
     let used = used(context.tree);
     for kind in [Kind::Medium, Kind::Bsdf, Kind::Phase, Kind::Texture] {
         for child in props.children(kind) {
             match kind {
+                Kind::Medium if !used.contains(&child.id) => {
+                    let medium = medium::convert(context, child)?;
+                    if let Some(Volume::Grid(volume)) = &medium.volumes.sigma_t {
+                        let (name, geometry) = (medium.name.clone(), mesh::box_of(volume.to_world));
+                        let id = context.medium(child)?;
+                        shapes.push(Shape::boundary(&name, Geometry::Mesh(geometry), id));
+                        continue;
+                    }
+                }
                 Kind::Medium => drop(medium::convert(context, child)?),
                 Kind::Bsdf => drop(bsdf::convert(context, child)?),
                 Kind::Texture => drop(texture::convert(context, child)?),

@@ -3,17 +3,21 @@
 use glam::DVec3;
 
 use super::build::Context;
-use super::props::{Child, Given, Props, unknown_plugin};
+use super::props::{Child, Given, Props, VolumeOrColor, unknown_plugin};
+use super::spectrum::Meaning;
 use super::tree::Kind;
-use crate::scene::{Medium, Phase, SceneError};
+use super::volume;
+use crate::scene::{Medium, Phase, SceneError, Volume, Volumes};
 
-pub(super) const TYPES: [&str; 1] = ["homogeneous"];
+pub(super) const TYPES: [&str; 2] = ["homogeneous", "heterogeneous"];
 pub(super) const PHASE_TYPES: [&str; 5] = ["isotropic", "hg", "rayleigh", "blendphase", "tabphase"];
 
-/// A homogeneous medium, from `sigma_t` and `albedo` as in Mitsuba 3 or from `sigma_s` and `sigma_a` as in 0.6.
-pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Medium, SceneError> {
-    if !TYPES.contains(&child.object.plugin.as_str()) {
-        return Err(unknown_plugin(child.object, &TYPES));
+/// A medium; a homogeneous one from `sigma_t` and `albedo` as in Mitsuba 3 or from `sigma_s` and `sigma_a` as in 0.6.
+pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Medium, SceneError> {
+    match child.object.plugin.as_str() {
+        "homogeneous" => {}
+        "heterogeneous" => return heterogeneous(context, child),
+        _ => return Err(unknown_plugin(child.object, &TYPES)),
     }
     let props = context.props(child);
     let (sigma_t, albedo) = (props.color("sigma_t")?, props.fraction("albedo")?);
@@ -66,8 +70,78 @@ pub(super) fn convert<'a>(context: &Context<'a>, child: Child<'a>) -> Result<Med
         Some(child) => self::phase(context, child)?,
         None => Phase::Isotropic,
     };
-    let name = child.object.id.clone().unwrap_or_else(|| format!("medium at {}", child.object.at));
-    Ok(Medium { name, sigma_t, albedo, phase, emission })
+    Ok(Medium { name: name_of(child), sigma_t, albedo, phase, emission, volumes: Volumes::default() })
+}
+
+/// What to call a medium in messages.
+fn name_of(child: Child) -> String {
+    child.object.id.clone().unwrap_or_else(|| format!("medium at {}", child.object.at))
+}
+
+/// A medium whose coefficients depend on the place.
+fn heterogeneous<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Medium, SceneError> {
+    let props = context.props(child);
+    let sigma_t = props.color_or_volume("sigma_t", Meaning::Factor)?;
+    let albedo = props.color_or_volume("albedo", Meaning::Fraction)?;
+    let emission = props.color_or_volume("emission", Meaning::Emitted)?;
+    let scale = props.float("scale")?;
+    props.ignore_boolean("has_spectral_extinction")?;
+    props.ignore_boolean("sample_emitters")?;
+    let phase = props.child(Kind::Phase)?;
+    props.finish()?;
+    let scale = match scale {
+        Some(given) if given.value < 0.0 => {
+            return Err(given.at.error(format!("scale is {}; it must not be negative", given.value)));
+        }
+        Some(given) => given.value,
+        None => 1.0,
+    };
+    let at = |given: &Option<VolumeOrColor<'a>>| match given {
+        Some(VolumeOrColor::Constant(given)) => given.at,
+        Some(VolumeOrColor::Volume(child)) => child.at,
+        None => &child.object.at,
+    };
+    let (albedo_at, emission_at) = (at(&albedo), at(&emission));
+    let sigma_t = volume::coefficient(context, sigma_t, "sigma_t", DVec3::ONE)?;
+    let albedo = volume::coefficient(context, albedo, "albedo", DVec3::splat(0.75))?;
+    let emission = volume::coefficient(context, emission, "emission", DVec3::ZERO)?;
+    let most = match &albedo.field {
+        Some(Volume::Grid(field)) => f64::from(field.grid.max()),
+        _ => albedo.factor.max_element(),
+    };
+    if most > 1.0 {
+        return Err(albedo_at.error(format!("the largest albedo is {most}; it must lie between 0 and 1")));
+    }
+    if matches!(sigma_t.field, Some(Volume::Height(_))) && (emission.field.is_some() || emission.factor != DVec3::ZERO)
+    {
+        return Err(emission_at.error("a medium whose sigma_t is a heightvolume cannot emit"));
+    }
+    let only_grid = |field: Option<Volume>| match field {
+        Some(Volume::Grid(field)) => Some(field),
+        _ => None,
+    };
+    let most = match &sigma_t.field {
+        Some(Volume::Grid(field)) => f64::from(field.grid.max()),
+        _ => 1.0,
+    };
+    let extinction = sigma_t.factor * scale;
+    if !(extinction * most).is_finite() {
+        return Err(child.object.at.error("the extinction coefficient overflows: scale times sigma_t is infinite"));
+    }
+    let phase = match phase {
+        Some(child) => self::phase(context, child)?,
+        None => Phase::Isotropic,
+    };
+    let volumes =
+        Volumes { sigma_t: sigma_t.field, albedo: only_grid(albedo.field), emission: only_grid(emission.field) };
+    Ok(Medium {
+        name: name_of(child),
+        sigma_t: extinction,
+        albedo: albedo.factor,
+        phase,
+        emission: emission.factor,
+        volumes,
+    })
 }
 
 /// A phase function.

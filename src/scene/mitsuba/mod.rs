@@ -29,6 +29,7 @@ mod texture;
 mod transform;
 mod tree;
 mod values;
+mod volume;
 mod xml;
 
 /// A scene, and what its author should know about it.

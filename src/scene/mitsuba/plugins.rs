@@ -1,10 +1,10 @@
 //! Which plugins of Mitsuba 3 there are: those that are supported, and what to use instead of those that are not.
 
 use super::tree::{Kind, Object};
-use super::{bsdf, emitter, film, integrator, medium, sensor, shape, spectrum, texture};
+use super::{bsdf, emitter, film, integrator, medium, sensor, shape, spectrum, texture, volume};
 
 /// The supported plugins of each kind of element, in the order of the documentation.
-pub(super) const SUPPORTED: [(Kind, &[&str]); 12] = [
+pub(super) const SUPPORTED: [(Kind, &[&str]); 13] = [
     (Kind::Integrator, &integrator::TYPES),
     (Kind::Sensor, &sensor::TYPES),
     (Kind::Film, &film::FILM_TYPES),
@@ -17,11 +17,12 @@ pub(super) const SUPPORTED: [(Kind, &[&str]); 12] = [
     (Kind::Texture, &texture::TYPES),
     (Kind::Spectrum, &spectrum::TYPES),
     (Kind::Emitter, &emitter::TYPES),
+    (Kind::Volume, &volume::TYPES),
 ];
 
 /// Plugins of Mitsuba 3.9 that are not supported, and what to use instead. An entry of a plugin that is supported has no
 /// effect.
-pub(super) const REFUSED: [(Kind, &str, &str); 37] = [
+pub(super) const REFUSED: [(Kind, &str, &str); 34] = [
     (Kind::Integrator, "ptracer", "use \"volpath\": light is not traced from the emitters here"),
     (Kind::Integrator, "depth", "use \"volpath\": only radiance is rendered"),
     (Kind::Integrator, "stokes", "use \"volpath\": light is not polarised here"),
@@ -32,7 +33,6 @@ pub(super) const REFUSED: [(Kind, &str, &str); 37] = [
     (Kind::Sensor, "distant", "use \"orthographic\""),
     (Kind::Sensor, "batch", "use one scene file for each camera"),
     (Kind::Film, "specfilm", "use \"hdrfilm\": light has three channels here"),
-    (Kind::Medium, "heterogeneous", "use \"homogeneous\" in nested boundaries"),
     (Kind::Phase, "sggx", "use \"hg\" or \"tabphase\""),
     (Kind::Shape, "bsplinecurve", "convert it to a mesh file (obj or ply)"),
     (Kind::Shape, "linearcurve", "convert it to a mesh file (obj or ply)"),
@@ -61,8 +61,6 @@ pub(super) const REFUSED: [(Kind, &str, &str); 37] = [
     (Kind::Emitter, "directionalarea", "use \"area\" far away, or \"directional\""),
     (Kind::Emitter, "sunsky", "render the sky to an image for \"envmap\""),
     (Kind::Emitter, "timed_sunsky", "render the sky to an image for \"envmap\""),
-    (Kind::Volume, "constvolume", "use the property of the medium itself"),
-    (Kind::Volume, "gridvolume", "use a \"homogeneous\" medium"),
 ];
 
 /// What to use instead of a plugin, as the middle of an error message.

@@ -44,6 +44,12 @@ pub(super) enum Colored<'a> {
     Texture(Child<'a>),
 }
 
+/// A colour, or the field in space that it comes from.
+pub(super) enum VolumeOrColor<'a> {
+    Constant(Given<'a, DVec3>),
+    Volume(Child<'a>),
+}
+
 /// A number, or a name that stands for one.
 pub(super) enum NumberOrName {
     Number(f64),
@@ -175,6 +181,29 @@ impl<'a> Props<'a> {
             return Ok(Some(Colored::Texture(Child { id, object, name: Some(name), at: &property.at })));
         }
         Ok(self.spectrum(name, Meaning::Fraction, true)?.map(Colored::Constant))
+    }
+
+    /// A coefficient of a medium: a quantity of each channel, or a field in space.
+    pub fn color_or_volume(
+        &self,
+        name: &'static str,
+        meaning: Meaning,
+    ) -> Result<Option<VolumeOrColor<'a>>, SceneError> {
+        let Some(property) = self.find(name) else { return Ok(None) };
+        if let Value::Object(id) = property.value
+            && self.tree.objects[id].kind == Kind::Volume
+        {
+            let object = &self.tree.objects[id];
+            return Ok(Some(VolumeOrColor::Volume(Child { id, object, name: Some(name), at: &property.at })));
+        }
+        match spectrum::color_of(self.tree, &property.value, &property.at, meaning)? {
+            Some(value) => Ok(Some(VolumeOrColor::Constant(Given { value, at: &property.at }))),
+            None => {
+                let refused: Option<Given<()>> =
+                    self.typed(name, "<rgb>, <float>, <spectrum> or <volume>", |_| None)?;
+                Ok(refused.map(|_| unreachable!("nothing is accepted")))
+            }
+        }
     }
 
     /// A refractive index: a number, or the name of a material.

@@ -1,0 +1,123 @@
+//! `<volume>`: coefficients of a medium that depend on the place.
+
+use std::sync::Arc;
+
+use glam::{DMat4, DVec3};
+
+use super::build::Context;
+use super::props::{Child, Given, VolumeOrColor, unknown_plugin};
+use super::source;
+use super::texture::choice;
+use crate::scene::{Filter, Grid, GridVolume, HeightVolume, SceneError, Volume, Wrap};
+
+pub(super) const TYPES: [&str; 3] = ["constvolume", "gridvolume", "heightvolume"];
+
+/// A coefficient: a constant, times a field in space if there is one.
+pub(super) struct Coefficient {
+    pub factor: DVec3,
+    pub field: Option<Volume>,
+}
+
+/// What stands for a coefficient.
+pub(super) fn coefficient<'a>(
+    context: &mut Context<'a>,
+    given: Option<VolumeOrColor<'a>>,
+    name: &str,
+    default: DVec3,
+) -> Result<Coefficient, SceneError> {
+    let constant = |given: Given<DVec3>| {
+        if given.value.min_element() < 0.0 {
+            return Err(given.at.error(format!("{name} is {}; it must not be negative", given.value)));
+        }
+        Ok(Coefficient { factor: given.value, field: None })
+    };
+    match given {
+        None => Ok(Coefficient { factor: default, field: None }),
+        Some(VolumeOrColor::Constant(given)) => constant(given),
+        Some(VolumeOrColor::Volume(child)) => match child.object.plugin.as_str() {
+            "constvolume" => {
+                let props = context.props(child);
+                let value = if name == "emission" { props.emission("value")? } else { props.color("value")? };
+                props.finish()?;
+                match value {
+                    Some(given) => constant(given),
+                    None => Ok(Coefficient { factor: DVec3::ONE, field: None }),
+                }
+            }
+            "gridvolume" => Ok(Coefficient { factor: DVec3::ONE, field: Some(Volume::Grid(grid(context, child)?)) }),
+            "heightvolume" => height(context, child, name),
+            _ => Err(unknown_plugin(child.object, &TYPES)),
+        },
+    }
+}
+
+/// Voxels in a box.
+fn grid<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<GridVolume, SceneError> {
+    let props = context.props(child);
+    let filename = props.string("filename")?.ok_or_else(|| {
+        child.object.at.error("<volume type=\"gridvolume\"> needs <string name=\"filename\" value=\"…\"/>")
+    })?;
+    let filter = choice(&props, "filter_type", &[("trilinear", Filter::Bilinear), ("nearest", Filter::Nearest)])?;
+    let wraps = [("clamp", Wrap::Clamp), ("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror)];
+    let wrap = choice(&props, "wrap_mode", &wraps)?;
+    let to_world = props.transform("to_world")?;
+    let own_box = props.boolean("use_grid_bbox")?.is_some_and(|given| given.value);
+    // How Mitsuba's spectral variants upsample colours, and whether a GPU's texture units look voxels up.
+    props.ignore_boolean("raw")?;
+    props.ignore_boolean("accel")?;
+    props.finish()?;
+
+    let path = source::find(&filename.value, child.object.folders.iter());
+    let (grid, [low, high]) = match context.grids.get(&path) {
+        Some(known) => known.clone(),
+        None => {
+            let (grid, bounds) = Grid::read(&path)
+                .map_err(|cause| filename.at.error(format!("cannot read the volume {}: {cause}", path.display())))?;
+            let read = (Arc::new(grid), bounds);
+            context.grids.insert(path, read.clone());
+            read
+        }
+    };
+    let placed = match to_world {
+        Some(Given { value, at }) if value.determinant().abs() < f64::MIN_POSITIVE => {
+            return Err(at.error(format!("to_world has no inverse: {value}")));
+        }
+        Some(given) => given.value,
+        None => DMat4::IDENTITY,
+    };
+    let cube = if own_box { DMat4::from_translation(low) * DMat4::from_scale(high - low) } else { DMat4::IDENTITY };
+    Ok(GridVolume { grid, to_world: placed * cube, filter, wrap })
+}
+
+/// Fog that thins out with height.
+fn height<'a>(context: &mut Context<'a>, child: Child<'a>, name: &str) -> Result<Coefficient, SceneError> {
+    let props = context.props(child);
+    let (value, base, up) = (props.color("value")?, props.vector("base")?, props.vector("up")?);
+    let scale_height = props.float("scale_height")?.ok_or_else(|| {
+        child.object.at.error(
+            "<volume type=\"heightvolume\"> needs <float name=\"scale_height\" value=\"…\"/>, over which the density falls to 1/e",
+        )
+    })?;
+    props.finish()?;
+    if name != "sigma_t" {
+        return Err(child.at.error(format!("{name} cannot be a heightvolume; only sigma_t can")));
+    }
+    if scale_height.value <= 0.0 {
+        let text = format!("scale_height is {}; it must be greater than 0", scale_height.value);
+        return Err(scale_height.at.error(text));
+    }
+    let factor = match value {
+        Some(given) if given.value.min_element() < 0.0 => {
+            return Err(given.at.error(format!("value is {}; it must not be negative", given.value)));
+        }
+        Some(given) => given.value,
+        None => DVec3::ONE,
+    };
+    let up = match up {
+        Some(given) => given.value.try_normalize().ok_or_else(|| given.at.error("up must not be zero"))?,
+        None => DVec3::Y,
+    };
+    let field =
+        HeightVolume { base: base.map_or(DVec3::ZERO, |given| given.value), up, scale_height: scale_height.value };
+    Ok(Coefficient { factor, field: Some(Volume::Height(field)) })
+}
