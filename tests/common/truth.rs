@@ -30,11 +30,9 @@ pub fn whole() -> bool {
     full() || picked().is_some()
 }
 
-/// The bias worth catching: relative to what is expected, but no less than an absolute one. Half a per cent and 5e-4 for the
-/// core rows of a full run, twice that for all others.
-pub fn tolerance(row: &Row, expected: f64) -> f64 {
-    let unit = if full() && row.core() { 5e-4 } else { 1e-3 };
-    (10.0 * unit * expected).max(unit)
+/// The bias worth catching: a hundredth of what is expected, but no less than a thousandth.
+pub fn tolerance(expected: f64) -> f64 {
+    (1e-2 * expected).max(1e-3)
 }
 
 /// The cosines of table A2 that this run tests, with their places in the table's lists: all, or one steep and one flat.

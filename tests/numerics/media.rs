@@ -95,6 +95,15 @@ fn half_spaces_of_every_density() {
 }
 
 #[test]
+fn long_walks_under_a_boundary_stay_under_it() {
+    // Light that stays long comes back to the boundary hundreds of times. A vertex that rounds to its other side would walk on there,
+    // and come back brighter by 3 % from the ball and from the face.
+    for (name, scene) in [("ball", ball(1e5, 0.99, 0.0)), ("face", face(1e5, 0.99))] {
+        judge(&format!("{name}, albedo 0.99, 1e5 free paths"), estimate(&scene, 3, 1024), half_space(0.99), 3e-3, 3e-3);
+    }
+}
+
+#[test]
 fn albedos_from_nothing_to_everything() {
     // Where little is scattered, only once: ω/2 (1 − log 2), the first order of the half space.
     let once = 0.5 * (1.0 - 2f64.ln());

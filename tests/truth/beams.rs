@@ -29,8 +29,8 @@ fn lit(slab: Slab, incident: f64, comes_back: bool, exit: f64, azimuth: f64) -> 
 }
 
 /// One per cent, but no less than what a white surface of a thousandth of the reflectance would send.
-fn tolerance(row: &Row, expected: f64) -> f64 {
-    crate::common::truth::tolerance(row, PI * expected) / PI
+fn tolerance(expected: f64) -> f64 {
+    crate::common::truth::tolerance(PI * expected) / PI
 }
 
 /// The cases of a row of A2: normal incidence, every direction at the same cosine alike.
@@ -42,7 +42,7 @@ fn normal_incidence(row: &Row) -> Vec<Case> {
         for (name, comes_back) in both.into_iter().filter(|(_, back)| whole() || (mu < 0.5) == *back) {
             let (values, error) = row.output(name);
             let scene = lit(slab, 1.0, comes_back, mu, 37.0);
-            let tolerance = tolerance(row, values[index]);
+            let tolerance = tolerance(values[index]);
             cases.push(Case::new(format!("{} {name} {mu}", row.id), scene, (values[index], error), tolerance));
         }
     }
@@ -59,7 +59,7 @@ fn oblique_incidence(row: &Row, azimuth_of: impl Fn(f64) -> f64) -> Vec<Case> {
             row.list("mu").into_iter().flat_map(|mu| row.list("dphi_deg").into_iter().map(move |dphi| (mu, dphi)));
         for ((mu, dphi), expected) in pairs.zip(values) {
             let scene = lit(slab, row.number("mu0"), comes_back, mu, azimuth_of(dphi));
-            let tolerance = tolerance(row, expected);
+            let tolerance = tolerance(expected);
             cases.push(Case::new(format!("{} {name} {mu} {dphi}", row.id), scene, (expected, error), tolerance));
         }
     }

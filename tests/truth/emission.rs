@@ -43,7 +43,7 @@ fn cases_of_table_i(row: &Row) -> Vec<Case> {
         let distances = row.list("b_over_R").into_iter().zip(expected);
         let cases = distances.map(|(b, expected)| {
             let scene = scenes::through_ball(medium.clone(), 2.0 * row.number("radius"), b * row.number("radius"));
-            Case::new(format!("{} {b}", row.id), scene, (expected, error), tolerance(row, expected))
+            Case::new(format!("{} {b}", row.id), scene, (expected, error), tolerance(expected))
         });
         return cases.collect();
     }
@@ -83,7 +83,7 @@ fn glowing_ball(row: &Row, strength: f64) -> Case {
     let (chord, error) = row.value("L_chord");
     let expected = 1.0 - chord;
     let scene = scenes::through_ball(medium, 2.0, 0.0);
-    Case::new(format!("{} L_emit0", row.id), scene, (expected, error), tolerance(row, expected))
+    Case::new(format!("{} L_emit0", row.id), scene, (expected, error), tolerance(expected))
 }
 
 fn balls() -> Vec<Row> {
@@ -103,7 +103,7 @@ fn glowing_slab(row: &Row, emission_of: impl Fn(f64) -> f64) -> Vec<Case> {
         let mut scene = slab.at_cosine(mu);
         scene.media[0].emission = DVec3::splat((1.0 - slab.albedo) * emission_of(slab.n));
         let expected = values[index];
-        Case::new(format!("{} L_emit {mu}", row.id), scene, (expected, error), tolerance(row, expected))
+        Case::new(format!("{} L_emit {mu}", row.id), scene, (expected, error), tolerance(expected))
     });
     cases.collect()
 }

@@ -74,7 +74,7 @@ fn transmittance(row: &Row, factor: f64) -> Case {
     scene.lights.push(Light::Constant { radiance: DVec3::ONE });
     let (expected, error) = row.value("T");
     let tau = row.value("tau").0;
-    Case::new(row.id.clone(), scene, (expected, error + off * tau * expected), tolerance(row, expected))
+    Case::new(row.id.clone(), scene, (expected, error + off * tau * expected), tolerance(expected))
 }
 
 /// The same by ratio tracking: a perfectly dark but for diffusely white sheet at the ray's origin, lit by parallel light along the ray
@@ -157,7 +157,7 @@ fn gradients(factor: f64) -> Vec<Case> {
             let lit = if name.starts_with('R') { slab.lit_from_above(view) } else { slab.lit_from_below(view) };
             let (expected, error) = row.value(name);
             let scene = fill(&row, &slab, lit, factor);
-            cases.push(Case::new(format!("{} {name}", row.id), scene, (expected, error), tolerance(&row, expected)));
+            cases.push(Case::new(format!("{} {name}", row.id), scene, (expected, error), tolerance(expected)));
         }
     }
     cases
@@ -214,7 +214,7 @@ fn layer_cases(swap: bool) -> Vec<Case> {
         for (name, from_above, lit_above) in views {
             let (expected, error) = row.value(name);
             let scene = layers(&row, from_above, lit_above, swap);
-            cases.push(Case::new(format!("{} {name}", row.id), scene, (expected, error), tolerance(&row, expected)));
+            cases.push(Case::new(format!("{} {name}", row.id), scene, (expected, error), tolerance(expected)));
         }
     }
     cases
@@ -228,9 +228,9 @@ fn layers_on_top_of_each_other() {
         let row = crate::common::truth::table("H2").into_iter().find(|row| row.id == "H2:0").expect("a row");
         let (expected, error) = row.value("R_coll_top");
         let scene = layers(&row, true, true, false);
-        cases.push(Case::new("H2:0 R_coll_top".to_owned(), scene, (expected, error), tolerance(&row, expected)));
+        cases.push(Case::new("H2:0 R_coll_top".to_owned(), scene, (expected, error), tolerance(expected)));
         let scene = layers(&row, true, true, true);
-        must_reject(&[Case::new("H2:0 turned over".to_owned(), scene, (expected, error), tolerance(&row, expected))]);
+        must_reject(&[Case::new("H2:0 turned over".to_owned(), scene, (expected, error), tolerance(expected))]);
     }
     judge("H2", &cases, CASES);
 }

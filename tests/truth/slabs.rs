@@ -124,7 +124,7 @@ fn both(row: &Row, slab: Slab, names: [&str; 2], view: impl Fn() -> Scene) -> [C
         .zip(names)
         .map(|(scene, name)| {
             let (expected, error) = row.value(name);
-            Case::new(format!("{} {name}", row.id), scene, (expected, error), tolerance(row, expected))
+            Case::new(format!("{} {name}", row.id), scene, (expected, error), tolerance(expected))
         })
         .collect::<Vec<_>>()
         .try_into()
@@ -169,7 +169,7 @@ fn slabs_seen_at_an_angle() {
             let both = [("R_mu", slab.lit_from_above(seen.clone())), ("T_mu", slab.lit_from_below(seen))];
             for (name, scene) in both.into_iter().filter(|(name, _)| whole() || (mu < 0.5) == (*name == "R_mu")) {
                 let (values, error) = row.output(name);
-                let tolerance = tolerance(&row, values[index]);
+                let tolerance = tolerance(values[index]);
                 cases.push(Case::new(format!("{} {name} {mu}", row.id), scene, (values[index], error), tolerance));
             }
         }

@@ -29,19 +29,19 @@ fn cases(row: &Row) -> Vec<Case> {
         .into_iter()
         .zip(expected)
         .map(|(b, expected)| {
-            let tolerance = tolerance(row, expected);
+            let tolerance = tolerance(expected);
             Case::new(format!("{} L_chord {b}", row.id), chord(row, b), (expected, error), tolerance)
         })
         .collect();
     // From the centre all directions look the same.
     let (expected, error) = row.value("J_center");
     let inside = lit_ball(row, DVec3::ZERO, v(0.3, 0.5, 0.8));
-    cases.push(Case::new(format!("{} J_center", row.id), inside, (expected, error), tolerance(row, expected)));
+    cases.push(Case::new(format!("{} J_center", row.id), inside, (expected, error), tolerance(expected)));
     // What is not absorbed leaves: 2 ∫ L(mu) mu dmu, where the chord at mu passes the centre at sqrt(1 − mu²).
     let (absorbed, error) = row.value("absorbed_fraction");
     let views = gauss(8).into_iter().map(|(mu, weight)| (2.0 * mu * weight, chord(row, (1.0 - mu * mu).sqrt())));
     let (expected, name) = (1.0 - absorbed, format!("{} 1 - absorbed_fraction", row.id));
-    let tolerance = tolerance(row, expected);
+    let tolerance = tolerance(expected);
     cases.push(Case { name, views: views.collect(), channel: 0, expected, error, tolerance, heavy_tailed: false });
     cases
 }
