@@ -8,7 +8,8 @@ use common::statistics::mean_and_error;
 use common::{images, scenes};
 use glam::{DMat4, DVec3};
 use tyndall::pack::Packed;
-use tyndall::scene::{Camera, Film, Geometry, Light, Medium, Phase, Scene, Shape};
+use tyndall::pack::layout::MEDIUM_SEALED;
+use tyndall::scene::{Bsdf, Camera, Film, Geometry, Light, Medium, Phase, Scene, Shape};
 
 /// z-values of the mean difference of two renders, pixel by pixel, of each channel, and the largest relative standard error.
 /// Each pixel of each render has its own random shifts, so the differences are independent.
@@ -240,4 +241,31 @@ fn a_lamp_in_pieces_is_the_lamp() {
     facets.positions.iter_mut().for_each(|p| *p = *p * 0.4 + v(1.5, 0.5, 0.0));
     mesh.shapes.push(Shape::lamp("ball", Geometry::Mesh(facets), v(3.0, 2.0, 1.0)));
     check("a glowing ball of facets", &packed(&sphere, 3), &packed(&mesh, 4), 2048);
+}
+
+#[test]
+fn light_is_not_sampled_in_vain_behind_glass() {
+    let mut scene = foggy(scenes::gray(0.1, 0.9, 0.0), true);
+    lamp(&mut scene, v(-0.5, 1.5, -0.5), DVec3::X, DVec3::Z);
+    let milk = scene.add_medium(Medium::new("milk", v(1.0, 2.0, 4.0), v(0.9, 0.95, 0.8), Phase::Isotropic));
+    let mut ball = Shape::boundary("ball", scenes::ball(v(0.0, 0.2, 0.0), 0.6), milk);
+    ball.bsdf = Bsdf::Dielectric {
+        int_ior: 1.5,
+        ext_ior: 1.0,
+        specular_reflectance: DVec3::ONE.into(),
+        specular_transmittance: DVec3::ONE.into(),
+    };
+    scene.shapes.push(ball);
+    let sealed = packed(&scene, 1);
+    assert!(sealed.features.sealed);
+    let mut sampled = packed(&scene, 2);
+    sampled.media.iter_mut().for_each(|medium| medium.grids &= !MEDIUM_SEALED);
+    sampled.features.sealed = false;
+    check("milk in glass", &sealed, &sampled, 8192);
+    // A point light in the milk, or anywhere, is found by sampling alone.
+    scene.lights.push(Light::Point { position: v(0.0, 0.2, 0.0), intensity: DVec3::ONE });
+    assert!(!packed(&scene, 1).features.sealed);
+    scene.lights.clear();
+    scene.shapes.push(Shape::lamp("inside", scenes::ball(v(0.0, 0.2, 0.0), 0.1), DVec3::ONE));
+    assert!(!packed(&scene, 1).features.sealed);
 }

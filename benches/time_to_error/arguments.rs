@@ -35,6 +35,9 @@ pub struct Arguments {
     /// Longest side of the references that are made, in pixels; they have the shape of the scene's film
     #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=8192))]
     pub reference_size: u32,
+    /// Also render without each part that lowers the error or the time, to see what it is worth
+    #[arg(long)]
+    pub levers: bool,
     /// Another renderer that takes part
     #[arg(long, value_name = "NAME")]
     pub peer: Option<Peer>,

@@ -11,7 +11,7 @@ use tyndall::scene::{Bsdf, Film, Scene};
 use super::arguments::Arguments;
 use super::error::{BenchError, write_text};
 use super::results::{Budget, OwnError};
-use super::tyndall_runs::OurDevice;
+use super::tyndall_runs::{Lever, OurDevice};
 
 /// Seeds of the two halves of a reference, far from those of the measured runs.
 const REFERENCE_SEEDS: [u32; 2] = [1_000_003, 2_000_003];
@@ -110,7 +110,10 @@ pub fn make_reference(device: &OurDevice, path: &Path, arguments: &Arguments, sp
     let mut halves = Vec::new();
     for seed in REFERENCE_SEEDS {
         eprintln!("{name}: {half} spp with seed {seed}");
-        let (image, _, _) = device.renderer(&name, &scene, seed)?.render(Budget::Samples(half))?;
+        // As simply as can be: with nothing that a measurement is about to judge.
+        let ready = device.renderer(&name, &scene, seed, Lever::NoPilot)?;
+        let mut renderer = ready.expect("every scene can do without a pilot");
+        let (image, _, _) = renderer.render(Budget::Samples(half))?;
         halves.push(image);
     }
     let mean = average(&halves[0], &halves[1]);

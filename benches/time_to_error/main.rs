@@ -27,7 +27,7 @@ use case::Case;
 use error::{BenchError, write_text};
 use peer::Mitsuba;
 use results::{Record, Run};
-use tyndall_runs::{OurDevice, start_up_child};
+use tyndall_runs::{Lever, OurDevice, start_up_child};
 
 /// Seeds of the runs that are measured begin here. References use others: see `case`.
 const FIRST_SEED: u32 = 1;
@@ -94,8 +94,11 @@ fn measure(
     for seed in FIRST_SEED..FIRST_SEED + arguments.seeds {
         let first = seed == FIRST_SEED;
         let start_up = Some(if first { start_ups.cold } else { start_ups.warm });
-        for run in device.measure(case, seed, &arguments.budgets(), start_up)? {
-            results.records.push(score(case, "Tyndall", "default", seed, first, run)?);
+        let levers = if arguments.levers { &Lever::LEVERS[..] } else { &[Lever::All] };
+        for &lever in levers {
+            for run in device.measure(case, seed, &arguments.budgets(), start_up, lever)? {
+                results.records.push(score(case, "Tyndall", lever.name(), seed, first, run)?);
+            }
         }
         let Some(peer) = mitsuba else { continue };
         let mut able = Vec::new();

@@ -60,6 +60,7 @@ pub fn markdown(summaries: &[Summary], conditions: &Conditions) -> String {
     if peer.is_some() {
         ratios(&mut text, summaries);
     }
+    levers(&mut text, summaries);
     text.push_str(
         "| scene | configuration | Msamples/CPU s | Msamples/s | first start, s | later, s | relMSE·CPU s \
          | with first start | trimmed·CPU s | MSE·CPU s | mean z |\n|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
@@ -114,7 +115,7 @@ fn ratios(text: &mut String, summaries: &[Summary]) {
          | trimmed | MSE | on the wall | budgets | mean z | its z |\n|---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     let mut columns: [Vec<f64>; COLUMNS.len()] = Default::default();
-    for ours in summaries.iter().filter(|summary| summary.renderer == "Tyndall") {
+    for ours in summaries.iter().filter(|summary| summary.is_ours()) {
         let values = COLUMNS.map(|(what, by)| ours.strongest(summaries, what, by).map(|(_, ratio)| by(&ratio)));
         for (column, value) in columns.iter_mut().zip(values) {
             column.extend(value);
@@ -141,6 +142,33 @@ fn ratios(text: &mut String, summaries: &[Summary]) {
     }
     let [main, largest, trimmed, mse, wall] = columns.map(|column| quotient(geometric_mean(column.into_iter())));
     let _ = writeln!(text, "| geometric mean | | | | **{main}** | {largest} | {trimmed} | {mse} | {wall} | | | |\n");
+}
+
+/// The table of what each part of the program is worth: error × time without it over error × time with it.
+fn levers(text: &mut String, summaries: &[Summary]) {
+    let of_tyndall = || summaries.iter().filter(|summary| summary.renderer == "Tyndall");
+    let mut names: Vec<&str> = Vec::new();
+    for summary in of_tyndall().filter(|summary| !summary.is_ours()) {
+        if !names.contains(&summary.configuration.as_str()) {
+            names.push(&summary.configuration);
+        }
+    }
+    if names.is_empty() {
+        return;
+    }
+    let _ = writeln!(text, "relMSE·CPU s without a part of the program, over that with it:\n");
+    let _ = writeln!(text, "| scene | {} |\n|---|{}", names.join(" | "), "--:|".repeat(names.len()));
+    for ours in summaries.iter().filter(|summary| summary.is_ours()) {
+        let gain = |name: &&str| {
+            let without =
+                of_tyndall().find(|summary| summary.scene == ours.scene && summary.configuration == **name)?;
+            let figure = |summary: &Summary| summary.figure(Measure::RelMse, Clock::Cpu);
+            Some(figure(without)? / figure(ours)?)
+        };
+        let gains: Vec<String> = names.iter().map(|name| quotient(gain(name))).collect();
+        let _ = writeln!(text, "| {} | {} |", ours.scene, gains.join(" | "));
+    }
+    text.push('\n');
 }
 
 /// Two digits behind the point, or a dash.

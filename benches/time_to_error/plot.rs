@@ -50,12 +50,16 @@ fn panel(
     all: &[Summary],
     area: &DrawingArea<SVGBackend, Shift>,
 ) -> Result<(), BenchError> {
-    let ours = of_scene.iter().find(|summary| summary.renderer == "Tyndall");
+    let ours = of_scene.iter().find(|summary| summary.is_ours());
     let strongest = ours
         .and_then(|ours| ours.strongest(all, (Measure::RelMse, Clock::Cpu), |ratio| ratio.value))
         .map(|(peer, _)| peer);
     let is_strongest = |summary: &Summary| strongest.is_some_and(|peer| std::ptr::eq(peer, summary));
-    let mut curves: Vec<Curve> = of_scene.iter().map(|summary| curve(summary, is_strongest(summary))).collect();
+    let mut curves: Vec<Curve> = of_scene
+        .iter()
+        .filter(|summary| summary.is_ours() || summary.renderer != "Tyndall")
+        .map(|summary| curve(summary, is_strongest(summary)))
+        .collect();
     // Labelled curves last, above the others.
     curves.sort_by_key(|curve| curve.label.is_some());
 
@@ -110,7 +114,7 @@ fn panel(
 }
 
 fn curve(summary: &Summary, strongest: bool) -> Curve {
-    let ours = summary.renderer == "Tyndall";
+    let ours = summary.is_ours();
     let points =
         summary.points.iter().filter_map(|point| Some((point.time.cpu, point.errors[Measure::RelMse as usize]?)));
     let (colour, label) = match (ours, strongest) {

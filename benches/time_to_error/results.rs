@@ -198,6 +198,11 @@ impl Point {
 }
 
 impl Summary {
+    /// Whether it is Tyndall as it is, and neither another renderer nor a part of it left out.
+    pub fn is_ours(&self) -> bool {
+        self.renderer == "Tyndall" && self.configuration == "default"
+    }
+
     fn of(records: &[&Record]) -> Summary {
         let budgets = records.iter().map(|record| record.budget).max().map_or(0, |last| last + 1);
         let of_budget = |budget| records.iter().copied().filter(|record| record.budget == budget).collect::<Vec<_>>();

@@ -10,6 +10,8 @@ use rustix::time::{ClockId, clock_gettime};
 use tyndall::gpu::{Device, DeviceChoice, Renderer};
 use tyndall::image::Image;
 use tyndall::pack::Packed;
+use tyndall::pack::layout::MEDIUM_SEALED;
+use tyndall::pilot;
 use tyndall::render::session::{self, Options};
 use tyndall::render::{Backend, picture};
 use tyndall::scene::{Crop, Scene};
@@ -21,6 +23,59 @@ use super::results::{Budget, Run, Time};
 
 /// Samples after which even a budget in seconds ends.
 const MOST_SAMPLES: u32 = 1 << 30;
+
+/// What a picture is rendered without, to see what it is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lever {
+    /// Nothing: as the program renders.
+    All,
+    /// Without the pilot run and its roulette.
+    NoPilot,
+    /// With all primitives in the tree.
+    NoImmediates,
+    /// Without equiangular distances.
+    NoEquiangular,
+    /// With light sampled in media that no shadow ray leaves.
+    NoSeals,
+}
+
+impl Lever {
+    /// All of them, the whole program first.
+    pub const LEVERS: [Lever; 5] =
+        [Lever::All, Lever::NoPilot, Lever::NoImmediates, Lever::NoEquiangular, Lever::NoSeals];
+
+    /// Its name in the results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Lever::All => "default",
+            Lever::NoPilot => "no pilot",
+            Lever::NoImmediates => "all in the tree",
+            Lever::NoEquiangular => "no equiangular",
+            Lever::NoSeals => "no seals",
+        }
+    }
+
+    /// The tables without it, or nothing if the scene had no use for it.
+    fn pull(self, packed: Packed) -> Option<Packed> {
+        let features = packed.features;
+        let mut packed = match self {
+            Lever::NoImmediates => packed.with_immediates(0),
+            _ => packed,
+        };
+        match self {
+            Lever::All | Lever::NoPilot | Lever::NoImmediates => {}
+            Lever::NoEquiangular => {
+                packed.media.iter_mut().for_each(|medium| medium.equiangular = 0.0);
+                packed.features.equiangular = false;
+            }
+            Lever::NoSeals => {
+                packed.media.iter_mut().for_each(|medium| medium.grids &= !MEDIUM_SEALED);
+                packed.features.sealed = false;
+            }
+        }
+        (matches!(self, Lever::All | Lever::NoPilot) || packed.features != features).then_some(packed)
+    }
+}
 
 /// The device that is measured.
 pub struct OurDevice {
@@ -52,13 +107,26 @@ impl OurDevice {
         format!("{} ({})", self.device.info.name, self.device.info.driver)
     }
 
-    /// Prepares a scene. The first sample is rendered as well, for drivers compile when they first run a kernel.
-    pub fn renderer<'a>(&self, name: &'a str, scene: &'a Scene, seed: u32) -> Result<Ready<'a>, BenchError> {
+    /// Prepares a scene, or nothing if it has no use for the lever. The first sample is rendered as well, for drivers compile when they
+    /// first run a kernel.
+    pub fn renderer<'a>(
+        &self,
+        name: &'a str,
+        scene: &'a Scene,
+        seed: u32,
+        lever: Lever,
+    ) -> Result<Option<Ready<'a>>, BenchError> {
         let error = |cause: String| BenchError::Render { scene: name.to_owned(), cause };
         let packed = Packed::new(scene, seed).map_err(|cause| error(cause.to_string()))?;
+        let Some(mut packed) = lever.pull(packed) else { return Ok(None) };
+        let (begin, begin_cpu) = (Instant::now(), cpu_time());
+        if lever != Lever::NoPilot {
+            pilot::run(&mut packed);
+        }
+        let pilot = Time { wall: begin.elapsed().as_secs_f64(), cpu: cpu_time() - begin_cpu };
         let mut backend = Renderer::new(&self.device, &packed).map_err(|cause| error(cause.to_string()))?;
         backend.render(0..1).map_err(|cause| error(cause.to_string()))?;
-        Ok(Ready { name, scene, seed, backend })
+        Ok(Some(Ready { name, scene, seed, backend, pilot }))
     }
 
     /// One picture for each budget.
@@ -68,8 +136,9 @@ impl OurDevice {
         seed: u32,
         budgets: &[Budget],
         start_up: Option<Time>,
+        lever: Lever,
     ) -> Result<Vec<Run>, BenchError> {
-        let mut renderer = self.renderer(&case.name, &case.scene, seed)?;
+        let Some(mut renderer) = self.renderer(&case.name, &case.scene, seed, lever)? else { return Ok(Vec::new()) };
         let run = |(index, &budget): (usize, &Budget)| {
             let (image, spp, time) = renderer.render(budget)?;
             Ok(Run { budget: index, spp, image, time, start_up })
@@ -108,7 +177,7 @@ impl OurDevice {
 pub fn start_up_child(path: &Path, arguments: &Arguments) -> Result<(), BenchError> {
     let mut scene = load_scene(path)?;
     scene.film.crop = Crop { x: scene.film.width / 2, y: scene.film.height / 2, width: 1, height: 1 };
-    OurDevice::open(&arguments.device)?.renderer("the scene", &scene, 0)?;
+    OurDevice::open(&arguments.device)?.renderer("the scene", &scene, 0, Lever::All)?;
     println!("{}", cpu_time());
     Ok(())
 }
@@ -119,10 +188,12 @@ pub struct Ready<'a> {
     scene: &'a Scene,
     seed: u32,
     backend: Renderer,
+    /// What the pilot run took.
+    pilot: Time,
 }
 
 impl Ready<'_> {
-    /// Renders a picture, and returns it with the samples of each pixel and the time that they took.
+    /// Renders a picture, and returns it with the samples of each pixel and the time that they took, the pilot's included.
     pub fn render(&mut self, budget: Budget) -> Result<(Image, u32, Time), BenchError> {
         let options = match budget {
             Budget::Samples(spp) => Options { samples: 0..spp, time_limit: None },
@@ -136,7 +207,8 @@ impl Ready<'_> {
         let (begin, begin_cpu) = (Instant::now(), cpu_time());
         let rendered = session::render(&mut self.backend, pixels, &options, &AtomicBool::new(false), &mut |_| {})
             .map_err(|cause| error(cause.to_string()))?;
-        let time = Time { wall: begin.elapsed().as_secs_f64(), cpu: cpu_time() - begin_cpu };
+        let (wall, cpu) = (begin.elapsed().as_secs_f64(), cpu_time() - begin_cpu);
+        let time = Time { wall: wall + self.pilot.wall, cpu: cpu + self.pilot.cpu };
         let invalid: u64 = rendered.film.invalid().iter().sum();
         if invalid > 0 {
             return Err(error(format!("{invalid} samples are not finite")));

@@ -117,7 +117,9 @@ void scatter(inout Path path, Vertex vertex) {
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
-    path.shadow = (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface)) && sample_light(path, vertex, u.xy, u.zw);
+    bool sealed = HAS_SEALED && vertex.in_medium && (MEDIUM(valid_medium(path.medium)).grids & MEDIUM_SEALED) != 0u;
+    bool samples_light = !sealed && (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface));
+    path.shadow = samples_light && sample_light(path, vertex, u.xy, u.zw);
     path.next_direction = next.direction;
     path.next_medium = medium_towards(vertex, path.medium, next.direction);
     if (HAS_GRIDS && path.shadow) {
@@ -129,7 +131,7 @@ void scatter(inout Path path, Vertex vertex) {
         path.collisions = 0u;
     }
     path.throughput *= next.weight;
-    path.pdf = next.pdf;
+    path.pdf = sealed ? 0.0 : next.pdf; // light that scattering finds counts in full
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
     if (!is_finite(path.throughput)) {

@@ -94,6 +94,8 @@ pub struct Features {
     pub rr_depth: u32,
     /// Roulette by what a pilot run expects.
     pub pilot: bool,
+    /// A medium that no shadow ray leaves.
+    pub sealed: bool,
     /// Copies of the tree: 8 or 1.
     pub node_copies: u32,
     /// Primitives in the tree; without, all stand in the kernel.
@@ -124,7 +126,7 @@ impl Features {
             phases: packed.media.iter().any(|medium| medium.phase != 0),
             emission,
             volume_lights: kind(LIGHT_VOLUME),
-            grids: media && packed.media.iter().any(|medium| medium.grids != 0),
+            grids: media && packed.media.iter().any(|medium| medium.grids & !MEDIUM_SEALED != 0),
             voxels: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_VOXELS != 0),
             heights: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_HEIGHT != 0),
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
@@ -167,6 +169,7 @@ impl Features {
             max_depth,
             rr_depth,
             pilot: false,
+            sealed: packed.media.iter().any(|medium| medium.grids & MEDIUM_SEALED != 0),
             node_copies: packed.bvh.copies,
             tree: packed.immediate_count < packed.primitives.len(),
         }
@@ -208,6 +211,7 @@ impl Features {
             masks: true,
             far_clip: true,
             tree: true,
+            sealed: true,
             blends: true,
             reliefs: true,
             lens: true,
@@ -263,6 +267,7 @@ impl Features {
             ("HAS_MIS", self.mis),
             ("HAS_TREE", self.tree),
             ("HAS_PILOT", self.pilot),
+            ("HAS_SEALED", self.sealed),
         ]
         .map(|(name, value)| format!("const bool {name} = {value};\n"))
         .concat();

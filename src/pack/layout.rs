@@ -538,6 +538,8 @@ pub const MEDIUM_HEIGHT: u32 = 1 << 25;
 pub const MEDIUM_ALBEDO_GRID: u32 = 1 << 26;
 /// [`Medium::grids`]: voxels are a factor of the emission.
 pub const MEDIUM_EMISSION_GRID: u32 = 1 << 27;
+/// [`Medium::grids`]: no shadow ray leaves the medium, and light is not sampled in it.
+pub const MEDIUM_SEALED: u32 = 1 << 28;
 /// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
 pub const TILE: u32 = 8;
 /// Longest distance; rays that end nowhere end here.
@@ -606,6 +608,7 @@ pub fn glsl() -> String {
         ("GRID_RGB", GRID_RGB),
         ("MEDIUM_VOXELS", MEDIUM_VOXELS),
         ("MEDIUM_HEIGHT", MEDIUM_HEIGHT),
+        ("MEDIUM_SEALED", MEDIUM_SEALED),
         ("MEDIUM_ALBEDO_GRID", MEDIUM_ALBEDO_GRID),
         ("MEDIUM_EMISSION_GRID", MEDIUM_EMISSION_GRID),
         ("TILE", TILE),

@@ -118,6 +118,21 @@ pub fn pack_chain(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32
     }
 }
 
+/// Whether some light passes a surface without scattering.
+pub fn lets_shadow_rays_through(bsdf: &Bsdf) -> bool {
+    let opaque = matches!(
+        bsdf,
+        Bsdf::Diffuse { .. }
+            | Bsdf::Dielectric { .. }
+            | Bsdf::RoughDielectric { .. }
+            | Bsdf::Conductor { .. }
+            | Bsdf::RoughConductor { .. }
+            | Bsdf::Plastic { .. }
+            | Bsdf::RoughPlastic { .. }
+    );
+    !opaque
+}
+
 /// Whether light goes straight on, whatever the opacity.
 pub fn is_null(bsdf: &Bsdf) -> bool {
     match bsdf {

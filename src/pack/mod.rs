@@ -16,6 +16,7 @@ pub mod lights;
 pub mod material;
 pub mod nesting;
 pub mod phase;
+pub mod sealed;
 pub mod sky;
 pub mod sobol;
 mod support;
@@ -203,6 +204,7 @@ impl Packed {
         }
         let Arranged { bvh, primitives, corners, immediate_count } = arrange(primitives, corners, immediate::MOST);
         let lights = lights.finish();
+        sealed::mark(scene, &mut media);
         flight::choose_equiangular(scene, &nesting, &frame, &lights, &mut media);
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
         filter::pack(&scene.film, &mut params, &mut values);
@@ -331,6 +333,7 @@ const EMPTY_FEATURES: Features = Features {
     max_depth: 0,
     rr_depth: 0,
     pilot: false,
+    sealed: false,
     node_copies: 8,
     tree: true,
 };

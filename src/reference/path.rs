@@ -26,8 +26,8 @@ use super::path_vertex::{
 };
 use super::ray::offset_distance;
 use crate::pack::layout::{
-    LIGHT_VOLUME, MEDIUM_HEIGHT, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED, SURFACE_MASK,
-    SURFACE_ORIENTED, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
+    LIGHT_VOLUME, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED,
+    SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
 };
 use glam::{DVec2, DVec3, UVec2, Vec4Swizzles};
 
@@ -135,8 +135,9 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
-    path.shadow =
-        (vertex.in_medium || bsdf_has_density(&vertex.surface)) && sample_light(tables, path, vertex, u.xy(), u.zw());
+    let sealed = vertex.in_medium && medium_at(tables, path.medium).grids & MEDIUM_SEALED != 0;
+    let samples_light = !sealed && (vertex.in_medium || bsdf_has_density(&vertex.surface));
+    path.shadow = samples_light && sample_light(tables, path, vertex, u.xy(), u.zw());
     path.next_direction = next.direction;
     path.next_medium = medium_towards(tables, vertex, path.medium, next.direction);
     if tables.features.grids && path.shadow {
@@ -148,7 +149,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
         path.collisions = 0;
     }
     path.throughput *= next.weight;
-    path.pdf = next.pdf;
+    path.pdf = if sealed { 0.0 } else { next.pdf };
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
     if !path.throughput.is_finite() {

@@ -19,8 +19,8 @@ fn volume(input: &Value) -> (Volume, f64) {
     let number = |name: &str| input[name].as_f64().unwrap_or_else(|| panic!("{input}: no {name}"));
     let cube = unit_to(DVec3::ZERO, DVec3::ONE);
     // Voxels whose outermost centres lie on the faces of the cube.
-    let vertices = |count: usize| {
-        let half = DVec3::splat(0.5 / (count - 1) as f64);
+    let vertices = |size: [usize; 3]| {
+        let half = DVec3::from_array(size.map(|count| 0.5 / (count - 1) as f64));
         unit_to(-half, DVec3::ONE + half)
     };
     let at = |k: usize| k as f64 / (SMOOTH - 1) as f64;
@@ -39,7 +39,7 @@ fn volume(input: &Value) -> (Volume, f64) {
                 let squared = (v(at(x), at(y), at(z)) - center).length_squared();
                 number("rho0") * (-squared / (2.0 * number("s").powi(2))).exp()
             };
-            (Volume::Grid(field(grid([SMOOTH; 3], 1, rule), vertices(SMOOTH))), 1e-3)
+            (Volume::Grid(field(grid([SMOOTH; 3], 1, rule), vertices([SMOOTH; 3]))), 1e-3)
         }
         "grid" => {
             let size = input["shape"].as_array().expect("a grid has a shape");
@@ -49,7 +49,7 @@ fn volume(input: &Value) -> (Volume, f64) {
                 Some("pseudo") => ((7 * x + 13 * y + 29 * z + 5 * x * y * z) % 11) as f64 / 10.0,
                 other => panic!("voxels {other:?}"),
             };
-            let place = if input["interpolation"] == "vertex" { vertices(size[0]) } else { cube };
+            let place = if input["interpolation"] == "vertex" { vertices(size) } else { cube };
             let filter = if input["interpolation"] == "nearest" { Filter::Nearest } else { Filter::Bilinear };
             (Volume::Grid(GridVolume { filter, ..field(grid(size, 1, rule), place) }), 0.0)
         }
