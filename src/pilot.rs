@@ -87,7 +87,8 @@ struct Blocks {
 /// Runs a pilot and adds what it found to the tables of a scene. Scenes that gain nothing by it stay as they are.
 pub fn run(packed: &mut Packed) {
     let large = packed.pixel_count() >= LEAST_PIXELS && packed.features.max_depth >= LEAST_MAX_DEPTH;
-    if !large || packed.primitives.len() > MOST_PRIMITIVES {
+    // Without a tree rays are so cheap that shorter paths hardly pay for the noise of their ends.
+    if !large || !packed.features.tree || packed.primitives.len() > MOST_PRIMITIVES {
         return;
     }
     let mut tables = Tables::new(packed);

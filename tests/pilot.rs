@@ -16,8 +16,9 @@ use tyndall::scene::{Film, Scene};
 /// Large enough for a pilot.
 const SIDE: u32 = 64;
 
+/// With a pilot, which only scenes with a tree have.
 fn piloted(scene: &Scene) -> Packed {
-    let mut packed = scenes::pack(scene, 3);
+    let mut packed = scenes::pack(scene, 3).with_immediates(0);
     pilot::run(&mut packed);
     packed
 }
@@ -123,4 +124,7 @@ fn little_images_and_short_paths_have_no_pilot() {
         let packed = piloted(&scene);
         assert!(!packed.features.pilot && packed.values == scenes::pack(&scene, 3).values, "{name}");
     }
+    let mut without_tree = scenes::pack(&large(scenes::gray_box()), 3);
+    pilot::run(&mut without_tree);
+    assert!(!without_tree.features.tree && !without_tree.features.pilot);
 }

@@ -69,6 +69,12 @@ fn primitives_in_the_kernel_and_in_the_tree_are_met_alike() {
         }
     }
     assert!(scene_without_tree > 0, "some scene is small enough");
+    // One face of a cube in the tree, which is flat.
+    let mut scene = scenes::furnace(scenes::cuboid(glam::DMat4::from_rotation_y(0.5)), 1.0, 0.0);
+    scene.media[0].albedo = DVec3::splat(0.5);
+    let packed = scenes::pack(&scene, 8);
+    let [kernel, tree] = [12, 10].map(|most| images::on_device(&packed.clone().with_immediates(most), 64));
+    assert!(images::compare(&kernel, &tree).expect("the same paths") > 0.999);
 }
 
 #[test]

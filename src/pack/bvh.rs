@@ -123,6 +123,8 @@ impl Bvh {
 
 /// Steps by which bounds are rounded outwards beyond their own rounding. They make up for the rounding of the slab test.
 const MARGIN: f32 = 1.0;
+/// Least step of the grid, in canonical units: that rounding does not shrink with a tree that holds a part of the scene, or a flat scene.
+const LEAST_STEP: f32 = 1.5e-5;
 
 struct Grid {
     origin: Vec3,
@@ -133,9 +135,8 @@ impl Grid {
     fn new(tree: &Bvh2) -> Grid {
         let root = tree.nodes[0].aabb;
         let (min, max) = (Vec3::from(root.min), Vec3::from(root.max));
-        // Room for the margin on both sides, and some thickness for a flat scene.
-        let extent = (max - min).max(Vec3::splat((max - min).max_element().max(1e-6) * 1e-4));
-        let step = extent / (65535.0 - 2.0 * (MARGIN + 1.0));
+        // Room for the margin on both sides.
+        let step = ((max - min) / (65535.0 - 2.0 * (MARGIN + 1.0))).max(Vec3::splat(LEAST_STEP));
         Grid { origin: min - step * (MARGIN + 1.0), step }
     }
 

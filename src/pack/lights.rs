@@ -12,6 +12,9 @@ use std::f64::consts::PI;
 
 /// Share of the choice that is uniform over the lights. The rest goes by power, which says little about what arrives.
 const UNIFORM_SHARE: f64 = 0.1;
+/// Share of that rest that goes to lights in the scene and to those infinitely far in equal halves. The power of a sky grows with the scene, and a
+/// lamp in a wide landscape may still decide what its pictures show.
+const HALVED_SHARE: f64 = 0.8;
 
 /// Largest cosine between the edges of what counts as a rectangle.
 const PERPENDICULAR: f64 = 1e-5;
@@ -168,11 +171,16 @@ impl LightTable {
     pub fn finish(mut self) -> Vec<Light> {
         let count = self.lights.len();
         let total: f64 = self.powers.iter().sum();
-        let probability = |power: f64| {
+        let near: Vec<bool> = self.lights.iter().map(is_near).collect();
+        let of_near: f64 = self.powers.iter().zip(&near).filter(|(_, near)| **near).map(|(power, _)| power).sum();
+        let both = of_near > 0.0 && total > of_near;
+        let probability = |(&power, &near): (&f64, &bool)| {
             let by_power = if total > 0.0 { power / total } else { 1.0 / count as f64 };
+            let half = 0.5 * power / if near { of_near } else { total - of_near };
+            let by_power = if both { (1.0 - HALVED_SHARE) * by_power + HALVED_SHARE * half } else { by_power };
             (1.0 - UNIFORM_SHARE) * by_power + UNIFORM_SHARE / count as f64
         };
-        let probabilities: Vec<f64> = self.powers.iter().map(|&power| probability(power)).collect();
+        let probabilities: Vec<f64> = self.powers.iter().zip(&near).map(probability).collect();
         for ((light, probability), (threshold, alias)) in
             self.lights.iter_mut().zip(&probabilities).zip(alias_table(&probabilities))
         {
@@ -182,6 +190,12 @@ impl LightTable {
         }
         self.lights
     }
+}
+
+/// Whether a light is at some place.
+fn is_near(light: &Light) -> bool {
+    let kind = light.kind & ((1 << LIGHT_TEXTURE_SHIFT) - 1);
+    !matches!(kind, LIGHT_CONSTANT | LIGHT_DIRECTIONAL | LIGHT_ENVMAP)
 }
 
 /// Cross section of a sphere about the scene: what parallel light passes through.
