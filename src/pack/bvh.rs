@@ -63,13 +63,13 @@ pub fn bounds(primitive: &Primitive) -> (Vec3, Vec3) {
 impl Bvh {
     /// Builds the tree and returns it with the primitives in the order of its leaves.
     pub fn new(primitives: &[Primitive]) -> (Bvh, Vec<Primitive>) {
-        let (bvh, order) = Bvh::with_order(primitives, 0);
+        let (bvh, order) = Bvh::with_order(primitives, 0, Vec3::ZERO);
         (bvh, order.iter().map(|&index| primitives[index as usize]).collect())
     }
 
     /// Builds the tree and returns it with the indices of the primitives in the order of its leaves. The leaves count from
-    /// `first` on.
-    pub fn with_order(primitives: &[Primitive], first: u32) -> (Bvh, Vec<u32>) {
+    /// `first` on. `whole` is the extent of the scene, of which the primitives may be a part.
+    pub fn with_order(primitives: &[Primitive], first: u32, whole: Vec3) -> (Bvh, Vec<u32>) {
         assert!(primitives.len() + first as usize <= MAX_PRIMITIVES, "the caller refuses larger scenes");
         if primitives.is_empty() {
             return (Bvh::empty(), Vec::new());
@@ -87,7 +87,7 @@ impl Bvh {
             ..BvhBuildParams::medium_build()
         };
         let tree = build_bvh2(&boxes, config, &mut Default::default());
-        let grid = Grid::new(&tree);
+        let grid = Grid::new(&tree, whole);
         let mut order = Vec::with_capacity(primitives.len());
         let mut leaf_starts = vec![0u32; tree.nodes.len()];
         number_leaves(&tree, first, &mut order, &mut leaf_starts);
@@ -123,8 +123,6 @@ impl Bvh {
 
 /// Steps by which bounds are rounded outwards beyond their own rounding. They make up for the rounding of the slab test.
 const MARGIN: f32 = 1.0;
-/// Least step of the grid, in canonical units: that rounding does not shrink with a tree that holds a part of the scene, or a flat scene.
-const LEAST_STEP: f32 = 1.5e-5;
 
 struct Grid {
     origin: Vec3,
@@ -132,11 +130,14 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(tree: &Bvh2) -> Grid {
+    /// `whole` is the extent of the scene, of which the tree may hold a part: rounding does not shrink with the part.
+    fn new(tree: &Bvh2, whole: Vec3) -> Grid {
         let root = tree.nodes[0].aabb;
         let (min, max) = (Vec3::from(root.min), Vec3::from(root.max));
-        // Room for the margin on both sides.
-        let step = ((max - min) / (65535.0 - 2.0 * (MARGIN + 1.0))).max(Vec3::splat(LEAST_STEP));
+        // Room for the margin on both sides, and some thickness for a flat scene.
+        let extent = whole.max(max - min);
+        let extent = extent.max(Vec3::splat(extent.max_element().max(1e-6) * 1e-4));
+        let step = extent / (65535.0 - 2.0 * (MARGIN + 1.0));
         Grid { origin: min - step * (MARGIN + 1.0), step }
     }
 
