@@ -57,7 +57,12 @@ impl Lever {
 
     /// The tables without it, or nothing if the scene had no use for it.
     fn pull(self, packed: Packed) -> Option<Packed> {
-        let features = packed.features;
+        let useful = match self {
+            Lever::All | Lever::NoPilot => true,
+            Lever::NoImmediates => packed.immediate_count > 0,
+            Lever::NoEquiangular => packed.features.equiangular,
+            Lever::NoSeals => packed.features.sealed,
+        };
         let mut packed = match self {
             Lever::NoImmediates => packed.with_immediates(0),
             _ => packed,
@@ -73,7 +78,7 @@ impl Lever {
                 packed.features.sealed = false;
             }
         }
-        (matches!(self, Lever::All | Lever::NoPilot) || packed.features != features).then_some(packed)
+        useful.then_some(packed)
     }
 }
 
