@@ -60,6 +60,12 @@ pub fn bounds(primitive: &Primitive) -> (Vec3, Vec3) {
     }
 }
 
+/// The bounds of all of some primitives; inside out if there are none.
+pub fn bounds_of_all(primitives: &[Primitive]) -> (Vec3, Vec3) {
+    let each = primitives.iter().map(bounds);
+    each.fold((Vec3::MAX, Vec3::MIN), |(min, max), (low, high)| (min.min(low), max.max(high)))
+}
+
 impl Bvh {
     /// Builds the tree and returns it with the primitives in the order of its leaves.
     pub fn new(primitives: &[Primitive]) -> (Bvh, Vec<Primitive>) {

@@ -1,7 +1,8 @@
 //! How distances are sampled in each medium.
 
 use super::frame::{Bounds, Frame};
-use super::layout::{LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, Light, MEDIUM_HEIGHT, MEDIUM_VOXELS, Medium};
+use super::layout::{Light, MEDIUM_HEIGHT, MEDIUM_VOXELS, Medium};
+use super::lights::is_near;
 use super::nesting::Nesting;
 use crate::scene::{MediumId, Scene};
 
@@ -13,9 +14,7 @@ const THIN: f64 = 3.0;
 /// Switches equiangular sampling on for media that light from somewhere shines through. Behind glass it never arrives directly,
 /// and in an opaque medium only the first few free paths matter, which free flights sample well.
 pub fn choose_equiangular(scene: &Scene, nesting: &Nesting, frame: &Frame, lights: &[Light], media: &mut [Medium]) {
-    let local =
-        lights.iter().any(|light| ![LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP].contains(&(light.kind & 0xff)));
-    if !local || scene.integrator.max_depth.is_some_and(|depth| depth < 2) {
+    if !lights.iter().any(is_near) || scene.integrator.max_depth.is_some_and(|depth| depth < 2) {
         return;
     }
     for (index, medium) in media.iter_mut().enumerate().skip(1) {

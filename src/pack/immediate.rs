@@ -4,7 +4,7 @@
 //! the kernel and are tested by all rays in step, without a load; the tree holds the rest. A scene of a few primitives has no tree.
 //! Corners that primitives share are projected once, since the compiler sees that it is the same computation.
 
-use super::bvh::bounds;
+use super::bvh::{bounds, bounds_of_all};
 use super::layout::{PRIMITIVE_SPHERE, Primitive};
 use glam::Vec3;
 
@@ -17,10 +17,8 @@ const LEAST_SHARE: f32 = 0.02;
 pub fn order(primitives: &[Primitive], most: usize) -> (Vec<u32>, usize) {
     let all = 0..primitives.len() as u32;
     let few = primitives.len() <= most;
-    let boxes: Vec<(Vec3, Vec3)> = primitives.iter().map(bounds).collect();
-    let (min, max) = boxes.iter().fold((Vec3::MAX, Vec3::MIN), |(min, max), b| (min.min(b.0), max.max(b.1)));
-    let whole = half_area(min, max);
-    let share = |index: u32| half_area(boxes[index as usize].0, boxes[index as usize].1) / whole;
+    let whole = half_area(bounds_of_all(primitives));
+    let share = |index: u32| half_area(bounds(&primitives[index as usize])) / whole;
     let mut large: Vec<u32> = all
         .clone()
         .filter(|&index| (few || share(index) >= LEAST_SHARE) && is_broad(&primitives[index as usize]))
@@ -44,7 +42,7 @@ fn is_broad(primitive: &Primitive) -> bool {
     surface & PRIMITIVE_SPHERE != 0 || (b - a).cross(c - a).length() > 1e-4 * longest
 }
 
-fn half_area(min: Vec3, max: Vec3) -> f32 {
+fn half_area((min, max): (Vec3, Vec3)) -> f32 {
     let side = max - min;
     side.x * side.y + side.y * side.z + side.z * side.x
 }

@@ -192,8 +192,8 @@ impl LightTable {
     }
 }
 
-/// Whether a light is at some place.
-fn is_near(light: &Light) -> bool {
+/// Whether a light is at some place, not infinitely far.
+pub fn is_near(light: &Light) -> bool {
     let kind = light.kind & ((1 << LIGHT_TEXTURE_SHIFT) - 1);
     !matches!(kind, LIGHT_CONSTANT | LIGHT_DIRECTIONAL | LIGHT_ENVMAP)
 }

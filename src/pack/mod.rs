@@ -281,10 +281,7 @@ fn arrange(primitives: Vec<Primitive>, corners: Vec<Corners>, most: usize) -> Ar
     let (mut order, immediate_count) = immediate::order(&primitives, most);
     let behind = order.split_off(immediate_count);
     let in_tree: Vec<Primitive> = behind.iter().map(|&index| primitives[index as usize]).collect();
-    let (min, max) = primitives
-        .iter()
-        .map(bvh::bounds)
-        .fold((Vec3::MAX, Vec3::MIN), |(min, max), (low, high)| (min.min(low), max.max(high)));
+    let (min, max) = bvh::bounds_of_all(&primitives);
     let (bvh, order_in_tree) = Bvh::with_order(&in_tree, immediate_count as u32, (max - min).max(Vec3::ZERO));
     order.extend(order_in_tree.iter().map(|&index| behind[index as usize]));
     let corners = if corners.is_empty() { corners } else { order.iter().map(|&k| corners[k as usize]).collect() };

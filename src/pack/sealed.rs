@@ -1,10 +1,10 @@
 //! Media that no shadow ray leaves: behind glass, without a light in them. Light sampling in them would find nothing, so it is left
 //! out, and all light that scattering finds counts in full.
 
+use super::frame::Bounds;
 use super::layout::{MEDIUM_SEALED, Medium};
 use super::material::lets_shadow_rays_through;
-use crate::scene::{Geometry, Light, MediumId, Scene, Shape};
-use glam::DVec3;
+use crate::scene::{Light, MediumId, Scene, Shape};
 
 /// Marks the media of a scene that are sealed. The expectation does not depend on it where light comes from surfaces or from infinitely
 /// far; light from a point or of one direction is found by light sampling alone, so nothing is sealed then.
@@ -26,19 +26,9 @@ pub fn mark(scene: &Scene, media: &mut [Medium]) {
 
 /// Whether the box of some light meets the box of a shape.
 fn holds_a_light(scene: &Scene, wall: &Shape) -> bool {
-    let (low, high) = bounds(&wall.geometry);
+    let around = Bounds::of(&wall.geometry);
     scene.shapes.iter().filter(|shape| shape.emission.is_some()).any(|shape| {
-        let (from, to) = bounds(&shape.geometry);
-        from.cmple(high).all() && to.cmpge(low).all()
+        let light = Bounds::of(&shape.geometry);
+        light.min.cmple(around.max).all() && light.max.cmpge(around.min).all()
     })
-}
-
-fn bounds(geometry: &Geometry) -> (DVec3, DVec3) {
-    match geometry {
-        Geometry::Sphere { center, radius, .. } => (*center - *radius, *center + *radius),
-        Geometry::Mesh(mesh) => mesh
-            .positions
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point))),
-    }
 }

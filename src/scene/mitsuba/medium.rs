@@ -29,13 +29,7 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
     let phase = props.child(Kind::Phase)?;
     props.finish()?;
 
-    let scale = match scale {
-        Some(given) if given.value < 0.0 => {
-            return Err(given.at.error(format!("scale is {}; it must not be negative", given.value)));
-        }
-        Some(given) => given.value,
-        None => 1.0,
-    };
+    let scale = factor(scale)?;
     let (sigma_t, albedo) = match (sigma_s, sigma_a) {
         (None, None) => {
             let sigma_t = coefficient("sigma_t", sigma_t)?.unwrap_or(DVec3::ONE);
@@ -78,6 +72,17 @@ fn name_of(child: Child) -> String {
     child.object.id.clone().unwrap_or_else(|| format!("medium at {}", child.object.at))
 }
 
+/// The factor of a medium's coefficients.
+fn factor(scale: Option<Given<'_, f64>>) -> Result<f64, SceneError> {
+    match scale {
+        Some(given) if given.value < 0.0 => {
+            Err(given.at.error(format!("scale is {}; it must not be negative", given.value)))
+        }
+        Some(given) => Ok(given.value),
+        None => Ok(1.0),
+    }
+}
+
 /// A medium whose coefficients depend on the place.
 fn heterogeneous<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Medium, SceneError> {
     let props = context.props(child);
@@ -89,13 +94,7 @@ fn heterogeneous<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Medi
     props.ignore_boolean("sample_emitters")?;
     let phase = props.child(Kind::Phase)?;
     props.finish()?;
-    let scale = match scale {
-        Some(given) if given.value < 0.0 => {
-            return Err(given.at.error(format!("scale is {}; it must not be negative", given.value)));
-        }
-        Some(given) => given.value,
-        None => 1.0,
-    };
+    let scale = factor(scale)?;
     let at = |given: &Option<VolumeOrColor<'a>>| match given {
         Some(VolumeOrColor::Constant(given)) => given.at,
         Some(VolumeOrColor::Volume(child)) => child.at,
