@@ -262,6 +262,13 @@ fn light_is_not_sampled_in_vain_behind_glass() {
     sampled.media.iter_mut().for_each(|medium| medium.grids &= !MEDIUM_SEALED);
     sampled.features.sealed = false;
     check("milk in glass", &sealed, &sampled, 8192);
+    // Were a medium sealed that is not, chance would still find all light.
+    let mut open = foggy(scenes::gray(0.3, 0.9, 0.5), true);
+    lamp(&mut open, v(-2.0, 1.5, -2.0), DVec3::X * 4.0, DVec3::Z * 4.0);
+    let mut mistaken = packed(&open, 3);
+    mistaken.media[1].grids |= MEDIUM_SEALED;
+    mistaken.features.sealed = true;
+    check("open fog taken for sealed", &packed(&open, 4), &mistaken, 4096);
     // A point light in the milk, or anywhere, is found by sampling alone.
     scene.lights.push(Light::Point { position: v(0.0, 0.2, 0.0), intensity: DVec3::ONE });
     assert!(!packed(&scene, 1).features.sealed);
