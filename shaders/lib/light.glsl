@@ -31,12 +31,6 @@ float area_pdf(float area, float distance, float cos_light) {
     return distance * distance / (area * cos_light);
 }
 
-// Whether a light is at some place, not infinitely far.
-bool is_local(Light light) {
-    uint kind = light.kind & 0xffu;
-    return kind != LIGHT_CONSTANT && kind != LIGHT_DIRECTIONAL && kind != LIGHT_ENVMAP;
-}
-
 // Coordinates along the two edges of a uniform point of a triangle or parallelogram.
 vec2 plane_light_point(Light light, vec2 u) {
     float s = sqrt(u.x);

@@ -15,14 +15,15 @@ struct FlightEnd {
     float dense;    // density times length of the way, in units of the medium's sigma_t; 0 where voxels have been accounted for
 };
 
-// A point of the light, chosen with two random numbers, if the light is somewhere.
-bool light_pivot(Light light, vec2 u, out vec3 pivot) {
-    pivot = light.origin;
+// A point of the light, chosen with two random numbers; of the strongest lamp, where the light is infinitely far. A path that may
+// meet light near a lamp must know of it, whatever light was chosen here: without, such paths are rare and bright.
+vec3 light_pivot(Light light, vec2 u) {
+    vec3 pivot = light.origin;
     if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_QUAD || (HAS_RECTANGLE_LIGHTS && light.kind == LIGHT_RECTANGLE)) {
         vec2 v = plane_light_point(light, u);
         pivot += light.edge_1 * v.x + light.edge_2 * v.y;
     }
-    return is_local(light);
+    return pivot;
 }
 
 // How far the free flight gets in the medium from t_min on.
@@ -58,16 +59,15 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
     float u = min(one_minus_exp_minus(path.tau_left) / scatters, 0.99999994);
     vec4 v = sample_set(path, PIVOT_SET + path.segment);
     Light light = LIGHT(choose_light(v.x));
-    vec3 pivot;
-    float share = light_pivot(light, v.zw, pivot) ? medium.equiangular : 0.0;
-    Stretch stretch = stretch_seen_from(pivot, path.origin, path.direction, path.t_min, t_end);
+    float share = medium.equiangular;
+    Stretch stretch = stretch_seen_from(light_pivot(light, v.zw), path.origin, path.direction, path.t_min, t_end);
     float s;
     if (u < share) {
         s = sample_equiangular(stretch, u / share);
     } else {
         s = min(free_flight(minus_log_1m_small((u - share) / (1.0 - share) * scatters), sigma), way);
     }
-    float density = share > 0.0 ? equiangular_pdf(stretch, s) : 0.0;
+    float density = equiangular_pdf(stretch, s);
     end.way = s;
     if (HAS_CHROMATIC) {
         vec3 collision = medium.sigma_t * exp_minus(path.tau_rgb + medium.sigma_t * s);

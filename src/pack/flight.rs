@@ -9,7 +9,7 @@ use crate::scene::{MediumId, Scene};
 /// Share of equiangular distances in media that are thin enough for them.
 const SHARE: f32 = 0.5;
 /// Across a medium of more than this optical depth, light does not come from near the lights alone.
-const THIN: f64 = 3.0;
+const THIN: f64 = 10.0;
 
 /// Switches equiangular sampling on for media that light from somewhere shines through. Behind glass it never arrives directly,
 /// and in an opaque medium only the first few free paths matter, which free flights sample well.

@@ -310,7 +310,8 @@ gpu_struct! {
 gpu_struct! {
     /// A light, with its line of the alias table by which lights are chosen.
     pub struct Light {
-        /// A corner; the position of a point or spot; the centre of a sphere.
+        /// A corner; the position of a point or spot; the centre of a sphere; of a light infinitely far, the middle of the strongest
+        /// light that is not, if there is one.
         origin: Vec3,
         /// One of the `LIGHT_` constants; of an environment map, its texture above [`LIGHT_TEXTURE_SHIFT`].
         kind: u32,

@@ -181,6 +181,13 @@ impl LightTable {
             (1.0 - UNIFORM_SHARE) * by_power + UNIFORM_SHARE / count as f64
         };
         let probabilities: Vec<f64> = self.powers.iter().zip(&near).map(probability).collect();
+        let strongest =
+            (0..count).filter(|&index| near[index]).max_by(|&a, &b| self.powers[a].total_cmp(&self.powers[b]));
+        if let Some(lamp) = strongest.map(|index| middle(&self.lights[index])) {
+            for (light, _) in self.lights.iter_mut().zip(&near).filter(|(_, near)| !**near) {
+                light.origin = lamp;
+            }
+        }
         for ((light, probability), (threshold, alias)) in
             self.lights.iter_mut().zip(&probabilities).zip(alias_table(&probabilities))
         {
@@ -196,6 +203,15 @@ impl LightTable {
 pub fn is_near(light: &Light) -> bool {
     let kind = light.kind & ((1 << LIGHT_TEXTURE_SHIFT) - 1);
     !matches!(kind, LIGHT_CONSTANT | LIGHT_DIRECTIONAL | LIGHT_ENVMAP)
+}
+
+/// A point in the middle of a light at some place.
+fn middle(light: &Light) -> Vec3 {
+    match light.kind {
+        LIGHT_TRIANGLE => light.origin + (light.edge_1 + light.edge_2) / 3.0,
+        LIGHT_QUAD | LIGHT_RECTANGLE => light.origin + (light.edge_1 + light.edge_2) / 2.0,
+        _ => light.origin,
+    }
 }
 
 /// Cross section of a sphere about the scene: what parallel light passes through.

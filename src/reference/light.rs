@@ -3,7 +3,7 @@
 use super::bindings::Light;
 use super::math::{arctan2, from_frame, sine};
 use super::warp::{square_to_cone, square_to_cone_pdf, square_to_sphere, square_to_sphere_pdf};
-use crate::pack::layout::{INFINITE_DISTANCE, LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_TRIANGLE};
+use crate::pack::layout::{INFINITE_DISTANCE, LIGHT_TRIANGLE};
 use glam::{DVec2, DVec3};
 
 /// The largest number below 1 that the kernel knows.
@@ -47,11 +47,6 @@ pub fn alias_keeps(threshold: f64, u: &mut f64) -> bool {
 /// Density per solid angle of a uniform point on a plane figure, seen at a distance under the cosine at the figure.
 pub fn area_pdf(area: f64, distance: f64, cos_light: f64) -> f64 {
     distance * distance / (area * cos_light)
-}
-
-/// Whether a light is at some place, not infinitely far.
-pub fn is_local(light: &Light) -> bool {
-    !matches!(light.kind & 0xff, LIGHT_CONSTANT | LIGHT_DIRECTIONAL | LIGHT_ENVMAP)
 }
 
 /// Coordinates along the two edges of a uniform point of a triangle or parallelogram.

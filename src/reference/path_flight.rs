@@ -6,7 +6,7 @@ use super::grid::{
     Span, grid_local, grid_transmittance, grid_value, height_flight, height_length, start_grid_walk, stream_numbers,
     walk_point, walk_to_collision,
 };
-use super::light::{is_local, plane_light_point};
+use super::light::plane_light_point;
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
 use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight, survival_weight};
 use super::path_state::{FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, choose_light, medium_at, sample_set};
@@ -34,12 +34,12 @@ pub struct FlightEnd {
     pub dense: f64,
 }
 
-/// A point of the light, if the light is somewhere.
-fn light_pivot(light: &Light, u: DVec2) -> Option<DVec3> {
+/// A point of the light, or of the strongest lamp where the light is infinitely far.
+fn light_pivot(light: &Light, u: DVec2) -> DVec3 {
     let on_plane = matches!(light.kind, LIGHT_TRIANGLE | LIGHT_QUAD | LIGHT_RECTANGLE);
     let v = if on_plane { plane_light_point(light, u) } else { DVec2::ZERO };
     let offset = if on_plane { light.edge_1 * v.x + light.edge_2 * v.y } else { DVec3::ZERO };
-    is_local(light).then_some(light.origin + offset)
+    light.origin + offset
 }
 
 /// How far the free flight gets in the medium from `t_min` on.
@@ -70,15 +70,14 @@ pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, sur
     let u = (one_minus_exp_minus(path.tau_left) / scatters).min(0.999_999_94);
     let mut v = sample_set(tables, path, PIVOT_SET + path.segment);
     let light = &tables.lights[choose_light(tables, &mut v.x) as usize];
-    let pivot = light_pivot(light, v.zw());
-    let share = if pivot.is_some() { medium.equiangular } else { 0.0 };
-    let stretch = stretch_seen_from(pivot.unwrap_or_default(), path.origin, path.direction, path.t_min, t_end);
+    let share = medium.equiangular;
+    let stretch = stretch_seen_from(light_pivot(light, v.zw()), path.origin, path.direction, path.t_min, t_end);
     let s = if u < share {
         sample_equiangular(&stretch, u / share)
     } else {
         free_flight(minus_log_1m((u - share) / (1.0 - share) * scatters), sigma).min(length)
     };
-    let density = if share > 0.0 { equiangular_pdf(&stretch, s) } else { 0.0 };
+    let density = equiangular_pdf(&stretch, s);
     end.way = s;
     let collision = medium.sigma_t * exp_minus_rgb(path.tau_rgb + medium.sigma_t * s);
     let ends = exp_minus_rgb(path.tau_rgb) * one_minus_exp_minus_rgb(medium.sigma_t * length);
