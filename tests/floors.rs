@@ -91,8 +91,10 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("path_surface", &["path_state", "texture"]),
     ("equiangular", &["math"]),
     ("path_vertex", &["path_state", "path_surface", "warp", "ray", "phase", "bsdf"]),
-    ("path_lights", &["path_state", "path_vertex", "light", "sky", "grid"]),
-    ("path_flight", &["path_state", "equiangular", "ray", "light", "grid"]),
+    ("toward_light", &["math"]),
+    ("path_aim", &["path_state", "path_vertex", "light", "toward_light"]),
+    ("path_lights", &["path_state", "path_vertex", "path_aim", "light", "sky", "grid"]),
+    ("path_flight", &["path_state", "path_aim", "equiangular", "ray", "light", "grid"]),
     ("path_rays", &["path_state", "path_surface", "path_flight", "ray"]),
     ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "path_flight", "camera", "filter", "outlook"]),
 ];
@@ -157,6 +159,7 @@ fn every_concept_has_a_mirror_and_a_unit_kernel() {
             concepts,
             &[
                 "path",
+                "path_aim",
                 "path_flight",
                 "path_lights",
                 "path_rays",

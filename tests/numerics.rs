@@ -13,6 +13,8 @@ mod media;
 mod meshes;
 #[path = "numerics/samplers.rs"]
 mod samplers;
+#[path = "numerics/toward_light.rs"]
+mod toward_light;
 
 use common::scenes::{self, v};
 use common::statistics::mean_and_error;

@@ -70,6 +70,7 @@ void path_start(inout Path path) {
     path.segment = 0u;
     path.depth = 0u;
     path.pdf = 0.0;
+    path.scattered_pdf = 0.0;
     path.alive = true;
     path.eta_scale = 1.0;
     path.foreseen = false;
@@ -112,14 +113,15 @@ void scatter(inout Path path, Vertex vertex) {
     }
     vec4 u = sample_set(path, 2u * path.segment + 1u);
     float lobe = HAS_LOBES || HAS_PHASES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
-    BsdfSample next = sample_scattering(vertex, u.zw, lobe);
+    Aim aim = find_aim(path, vertex);
+    BsdfSample next = sample_next(vertex, aim, u.zw, lobe, path.scattered_pdf);
     path.point = vertex.point;
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
     bool sealed = HAS_SEALED && vertex.in_medium && (MEDIUM(valid_medium(path.medium)).grids & MEDIUM_SEALED) != 0u;
     bool samples_light = !sealed && (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface));
-    path.shadow = samples_light && sample_light(path, vertex, u.xy, u.zw);
+    path.shadow = samples_light && sample_light(path, vertex, aim, u.xy, u.zw);
     path.next_direction = next.direction;
     path.next_medium = medium_towards(vertex, path.medium, next.direction);
     if (HAS_GRIDS && path.shadow) {

@@ -1,12 +1,10 @@
 // Where a flight through a medium ends: at a surface, or at a point where it scatters.
 #include "lib/path_state.glsl"
+#include "lib/path_aim.glsl"
 #include "lib/equiangular.glsl"
 #include "lib/light.glsl"
 #include "lib/ray.glsl"
 #include "lib/grid.glsl"
-
-// Sets of random numbers that choose what a segment's equiangular sampling goes by.
-const uint PIVOT_SET = 0x40000000u;
 
 struct FlightEnd {
     bool scatters;
@@ -14,17 +12,6 @@ struct FlightEnd {
     vec3 weight;    // of a path that scatters: albedo, transmittance and density of t together
     float dense;    // density times length of the way, in units of the medium's sigma_t; 0 where voxels have been accounted for
 };
-
-// A point of the light, chosen with two random numbers; of the strongest lamp, where the light is infinitely far. A path that may
-// meet light near a lamp must know of it, whatever light was chosen here: without, such paths are rare and bright.
-vec3 light_pivot(Light light, vec2 u) {
-    vec3 pivot = light.origin;
-    if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_QUAD || (HAS_RECTANGLE_LIGHTS && light.kind == LIGHT_RECTANGLE)) {
-        vec2 v = plane_light_point(light, u);
-        pivot += light.edge_1 * v.x + light.edge_2 * v.y;
-    }
-    return pivot;
-}
 
 // How far the free flight gets in the medium from t_min on.
 float free_way(Path path, Medium medium) {

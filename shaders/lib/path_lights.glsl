@@ -2,6 +2,7 @@
 // sampling (Veach and Guibas 1995).
 #include "lib/path_state.glsl"
 #include "lib/path_vertex.glsl"
+#include "lib/path_aim.glsl"
 #include "lib/light.glsl"
 #include "lib/sky.glsl"
 #include "lib/grid.glsl"
@@ -39,7 +40,7 @@ void add_sky(inout Path path) {
         Light light = LIGHT(i);
         vec3 radiance = light.radiance;
         // Light sampling takes the constant light's directions from the same scattering function (see sample_light).
-        float pdf = path.pdf;
+        float pdf = path.scattered_pdf;
         if (is_envmap(light)) {
             Texture sky = TEXTURE(light.kind >> LIGHT_TEXTURE_SHIFT);
             vec3 direction = to_envmap(light, path.direction);
@@ -115,7 +116,7 @@ void add_medium_emission(inout Path path, Medium medium, float way, bool ended) 
 }
 
 // Chooses a light and a point on it by u, and where a sampler has more to decide, by `decision`, and sets up the shadow ray. Returns whether there is anything to ask for.
-bool sample_light(inout Path path, Vertex vertex, vec2 u, vec2 decision) {
+bool sample_light(inout Path path, Vertex vertex, Aim aim, vec2 u, vec2 decision) {
     if (!HAS_LIGHT_SAMPLING) {
         return false;
     }
@@ -152,7 +153,7 @@ bool sample_light(inout Path path, Vertex vertex, vec2 u, vec2 decision) {
     path.light = index;
     path.light_channels = path.throughput * scattering.value;
     path.light_weight = path.light_channels * found.weight / light.probability;
-    path.pdf_ratio = HAS_MIS && found.pdf > 0.0 ? scattering.pdf / (found.pdf * light.probability) : 0.0;
+    path.pdf_ratio = HAS_MIS && found.pdf > 0.0 ? aimed_pdf(aim, scattering.pdf, found.direction) / (found.pdf * light.probability) : 0.0;
     path.light_medium = medium_towards(vertex, path.medium, found.direction);
     path.origin = offset_origin(path, found.direction);
     return max_component(path.light_weight) > 0.0 || !is_finite(path.light_weight);

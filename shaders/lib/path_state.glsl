@@ -34,6 +34,7 @@ struct Path {
     uint segment;           // counts the random numbers' sets
     uint depth;             // scattering events so far
     float pdf;              // density per solid angle of `direction`; 0 for a camera ray
+    float scattered_pdf;    // the same by scattering alone
     bool alive;
     // The medium and the flight through it. Scalars serve gray media, vectors chromatic ones.
     uint medium;            // NONE where boundaries that contradict each other leave none

@@ -34,6 +34,7 @@ sources! {
     "lib/medium.glsl",
     "lib/outlook.glsl",
     "lib/path.glsl",
+    "lib/path_aim.glsl",
     "lib/path_flight.glsl",
     "lib/path_lights.glsl",
     "lib/path_rays.glsl",
@@ -46,6 +47,7 @@ sources! {
     "lib/sampler.glsl",
     "lib/sky.glsl",
     "lib/texture.glsl",
+    "lib/toward_light.glsl",
     "lib/warp.glsl",
     "units/bsdf.comp",
     "units/bvh.comp",
@@ -64,6 +66,7 @@ sources! {
     "units/sampler.comp",
     "units/sky.comp",
     "units/texture.comp",
+    "units/toward_light.comp",
     "units/warp.comp",
 }
 

@@ -17,6 +17,7 @@ pub mod math;
 pub mod medium;
 pub mod outlook;
 pub mod path;
+pub mod path_aim;
 pub mod path_flight;
 pub mod path_lights;
 pub mod path_rays;
@@ -29,6 +30,7 @@ pub mod rng;
 pub mod sampler;
 pub mod sky;
 pub mod texture;
+pub mod toward_light;
 pub mod warp;
 
 use crate::pack::Packed;

@@ -8,6 +8,7 @@ use super::filter::sample_filter;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::channel_weights;
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
+use super::path_aim::{find_aim, sample_next};
 use super::path_flight::{
     albedo_factor, end_flight, end_height_flight, end_voxel_flight, enter_medium, flight_point, flight_side, free_way,
     near_distance, pass_medium,
@@ -21,9 +22,7 @@ use super::path_state::{
 use super::path_surface::{
     Place, apply_textures, opacity_at, shading_normal, share_at, surface_tangent, texture_coordinates, turn_frame,
 };
-use super::path_vertex::{
-    Vertex, medium_towards, offset_origin, sample_scattering, sides_agree, surface_point, to_surface_frame,
-};
+use super::path_vertex::{Vertex, medium_towards, offset_origin, sides_agree, surface_point, to_surface_frame};
 use super::ray::offset_distance;
 use crate::pack::layout::{
     LIGHT_VOLUME, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED,
@@ -130,14 +129,16 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     }
     let u = sample_set(tables, path, 2 * path.segment + 1);
     let lobe = sample_set(tables, path, 2 * path.segment + 2).y;
-    let next = sample_scattering(tables, vertex, u.zw(), lobe);
+    let aim = find_aim(tables, path, vertex);
+    let (next, scattered) = sample_next(tables, vertex, &aim, u.zw(), lobe);
+    path.scattered_pdf = scattered;
     path.point = vertex.point;
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
     let sealed = vertex.in_medium && medium_at(tables, path.medium).grids & MEDIUM_SEALED != 0;
     let samples_light = !sealed && (vertex.in_medium || bsdf_has_density(&vertex.surface));
-    path.shadow = samples_light && sample_light(tables, path, vertex, u.xy(), u.zw());
+    path.shadow = samples_light && sample_light(tables, path, vertex, &aim, u.xy(), u.zw());
     path.next_direction = next.direction;
     path.next_medium = medium_towards(tables, vertex, path.medium, next.direction);
     if tables.features.grids && path.shadow {

@@ -1,25 +1,19 @@
 //! Mirror of `shaders/lib/path_flight.glsl`: where a flight through a medium ends, at a surface or at a point where it scatters.
 
-use super::bindings::{Light, Medium, Primitive, Tables};
+use super::bindings::{Medium, Primitive, Tables};
 use super::equiangular::{equiangular_pdf, sample_equiangular, stretch_seen_from};
 use super::grid::{
     Span, grid_local, grid_transmittance, grid_value, height_flight, height_length, start_grid_walk, stream_numbers,
     walk_point, walk_to_collision,
 };
-use super::light::plane_light_point;
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
 use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight, survival_weight};
+use super::path_aim::{PIVOT_SET, light_pivot};
 use super::path_state::{FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, choose_light, medium_at, sample_set};
 use super::ray::{offset_distance, vertex_clearance};
 use super::sampler::set_key;
-use crate::pack::layout::{
-    LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_TRIANGLE, MEDIUM_ALBEDO_GRID, MEDIUM_EMISSION_GRID, MEDIUM_HEIGHT,
-    MEDIUM_VOXELS, PRIMITIVE_SPHERE,
-};
-use glam::{DVec2, DVec3, Vec4Swizzles};
-
-/// Sets of random numbers that choose what a segment's equiangular sampling goes by.
-const PIVOT_SET: u32 = 0x4000_0000;
+use crate::pack::layout::{MEDIUM_ALBEDO_GRID, MEDIUM_EMISSION_GRID, MEDIUM_HEIGHT, MEDIUM_VOXELS, PRIMITIVE_SPHERE};
+use glam::{DVec3, Vec4Swizzles};
 
 /// The end of a flight.
 #[derive(Clone, Copy, Debug)]
@@ -32,14 +26,6 @@ pub struct FlightEnd {
     pub weight: DVec3,
     /// Density times length of the way, in units of the medium's `sigma_t`; 0 where voxels have been accounted for.
     pub dense: f64,
-}
-
-/// A point of the light, or of the strongest lamp where the light is infinitely far.
-fn light_pivot(light: &Light, u: DVec2) -> DVec3 {
-    let on_plane = matches!(light.kind, LIGHT_TRIANGLE | LIGHT_QUAD | LIGHT_RECTANGLE);
-    let v = if on_plane { plane_light_point(light, u) } else { DVec2::ZERO };
-    let offset = if on_plane { light.edge_1 * v.x + light.edge_2 * v.y } else { DVec3::ZERO };
-    light.origin + offset
 }
 
 /// How far the free flight gets in the medium from `t_min` on.

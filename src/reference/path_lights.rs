@@ -10,6 +10,7 @@ use super::light::{
 };
 use super::math::max_component;
 use super::medium::{channel_weights, emitting_length, emitting_length_rgb, survival_weight};
+use super::path_aim::{Aim, aimed_pdf};
 use super::path_state::{
     EMISSION_SETS, INFINITE_DISTANCE, Path, choose_light, sample_set, survival, survived_throughput,
 };
@@ -62,7 +63,7 @@ pub fn add_sky(tables: &Tables, path: &mut Path) {
                 (sky_radiance(&tables.values, sky, uv), sky_pdf(&tables.values, sky, uv.x, direction.y))
             }
             // Light sampling takes the constant light's directions from the same scattering function (see `sample_light`).
-            None => (light.radiance, path.pdf),
+            None => (light.radiance, path.scattered_pdf),
         };
         let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
         let weight = scattering_mis_weight(tables, path, survival(tables, path), light_pdf);
@@ -131,7 +132,14 @@ pub fn add_medium_emission(tables: &Tables, path: &mut Path, medium: &Medium, wa
 }
 
 /// Chooses a light and a point on it by `u`, and where a sampler has more to decide, by `decision`, and sets up the shadow ray. Returns whether there is anything to ask for.
-pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DVec2, decision: DVec2) -> bool {
+pub fn sample_light(
+    tables: &Tables,
+    path: &mut Path,
+    vertex: &Vertex,
+    aim: &Aim,
+    mut u: DVec2,
+    decision: DVec2,
+) -> bool {
     if !tables.features.light_sampling {
         return false;
     }
@@ -169,8 +177,8 @@ pub fn sample_light(tables: &Tables, path: &mut Path, vertex: &Vertex, mut u: DV
     path.light = index;
     path.light_channels = path.throughput * scattering.value;
     path.light_weight = path.light_channels * found.weight / light.probability;
-    path.pdf_ratio =
-        if tables.features.mis && found.pdf > 0.0 { scattering.pdf / (found.pdf * light.probability) } else { 0.0 };
+    let pdf = aimed_pdf(aim, scattering.pdf, found.direction);
+    path.pdf_ratio = if tables.features.mis && found.pdf > 0.0 { pdf / (found.pdf * light.probability) } else { 0.0 };
     path.light_medium = medium_towards(tables, vertex, path.medium, found.direction);
     path.origin = offset_origin(path, found.direction);
     max_component(path.light_weight) > 0.0 || !path.light_weight.is_finite()

@@ -59,6 +59,8 @@ pub struct Path {
     pub depth: u32,
     /// Density per solid angle of `direction`; 0 for a camera ray.
     pub pdf: f64,
+    /// The same by scattering alone.
+    pub scattered_pdf: f64,
     /// The path goes on behind the ray that is asked for.
     pub alive: bool,
     /// Where the path is; [`NONE`] where boundaries that contradict each other leave no medium.

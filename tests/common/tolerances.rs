@@ -81,6 +81,8 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "equiangular angle", relative: 1e-6, absolute: 0.0 },
     Tolerance { function: "equiangular rank", relative: 0.0, absolute: 2e-6 },
     Tolerance { function: "equiangular_pdf", relative: 2e-6, absolute: 0.0 },
+    Tolerance { function: "sample_toward_light", relative: 0.0, absolute: 1e-6 },
+    Tolerance { function: "toward_light_pdf", relative: 2e-6, absolute: 0.0 },
     Tolerance { function: "lens_point", relative: 0.0, absolute: 2e-6 },
     Tolerance { function: "focused_direction", relative: 0.0, absolute: 2e-6 },
     Tolerance { function: "sample_filter rank", relative: 0.0, absolute: 8e-7 },

@@ -1,0 +1,68 @@
+// Where a path goes next: where its vertex scatters light, and in thin media past a lamp as well, where the medium shines brightest.
+#include "lib/path_state.glsl"
+#include "lib/path_vertex.glsl"
+#include "lib/light.glsl"
+#include "lib/toward_light.glsl"
+
+// Sets of random numbers that choose what a segment's sampling goes by: its direction, and then equiangular distances.
+const uint PIVOT_SET = 0x40000000u;
+
+// Share of directions that go by the lamp.
+const float AIMED_SHARE = 0.25;
+
+struct Aim {
+    vec3 axis;      // to a point of the lamp
+    float share;    // probability of directions by the lamp; 0 where only scattering counts
+    float u;        // decides between the two
+};
+
+// A point of the light, chosen with two random numbers; of the strongest lamp, where the light is infinitely far. A path that may
+// meet light near a lamp must know of it, whatever light was chosen here: without, such paths are rare and bright.
+vec3 light_pivot(Light light, vec2 u) {
+    vec3 pivot = light.origin;
+    if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_QUAD || (HAS_RECTANGLE_LIGHTS && light.kind == LIGHT_RECTANGLE)) {
+        vec2 v = plane_light_point(light, u);
+        pivot += light.edge_1 * v.x + light.edge_2 * v.y;
+    }
+    return pivot;
+}
+
+// What a vertex's next direction goes by. Glass is left to its own: a direction through it is not seen from the other side.
+Aim find_aim(Path path, Vertex vertex) {
+    Aim aim = Aim(vec3(0.0, 0.0, 1.0), 0.0, 0.0);
+    bool may = vertex.in_medium || !HAS_DIELECTRIC || (vertex.surface.flags & SURFACE_ORIENTED) == 0u;
+    if (HAS_EQUIANGULAR && may && MEDIUM(valid_medium(path.medium)).equiangular > 0.0) {
+        // The next segment's numbers: its distances go by the same point.
+        vec4 v = sample_set(path, PIVOT_SET + path.segment + 1u);
+        vec3 way = light_pivot(LIGHT(choose_light(v.x)), v.zw) - vertex.point;
+        float far = length(way);
+        aim = Aim(far > 0.0 ? way / far : aim.axis, far > 0.0 ? AIMED_SHARE : 0.0, v.y);
+    }
+    return aim;
+}
+
+// Density of a direction that scattering has with the density `pdf`, by both ways to choose it.
+float aimed_pdf(Aim aim, float pdf, vec3 direction) {
+    return HAS_EQUIANGULAR && aim.share > 0.0 ? mix(pdf, toward_light_pdf(aim.axis, direction), aim.share) : pdf;
+}
+
+// The next direction: by the one-sample model of multiple importance sampling (Veach and Guibas 1995), with the balance heuristic.
+// `scattered` is the density by scattering alone.
+BsdfSample sample_next(Vertex vertex, Aim aim, vec2 u, float lobe, out float scattered) {
+    BsdfSample next = sample_scattering(vertex, u, lobe);
+    scattered = next.pdf;
+    if (HAS_EQUIANGULAR && aim.share > 0.0) {
+        bool aimed = aim.u < aim.share;
+        if (aimed || next.pdf > 0.0) {
+            next.direction = aimed ? sample_toward_light(aim.axis, u) : next.direction;
+            next.eta = aimed ? 1.0 : next.eta;
+            BsdfValue value = eval_scattering(vertex, next.direction);
+            scattered = value.pdf;
+            next.pdf = aimed_pdf(aim, value.pdf, next.direction);
+            next.weight = value.value / next.pdf;
+        } else {
+            next.weight /= 1.0 - aim.share;
+        }
+    }
+    return next;
+}

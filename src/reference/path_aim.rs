@@ -1,0 +1,78 @@
+//! Mirror of `shaders/lib/path_aim.glsl`: where a path goes next, by scattering or past a lamp.
+
+use super::bindings::{Light, Tables};
+use super::bsdf::BsdfSample;
+use super::light::plane_light_point;
+use super::path_state::{Path, choose_light, medium_at, sample_set};
+use super::path_vertex::{Vertex, eval_scattering, sample_scattering};
+use super::toward_light::{sample_toward_light, toward_light_pdf};
+use crate::pack::layout::{LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_TRIANGLE, SURFACE_ORIENTED};
+use glam::{DVec2, DVec3, Vec4Swizzles};
+
+/// Sets of random numbers that choose what a segment's sampling goes by: its direction, and then equiangular distances.
+pub const PIVOT_SET: u32 = 0x4000_0000;
+
+/// Share of directions that go by the lamp.
+const AIMED_SHARE: f64 = 0.25;
+
+/// What a vertex's next direction goes by.
+#[derive(Clone, Copy, Debug)]
+pub struct Aim {
+    /// To a point of the lamp.
+    axis: DVec3,
+    /// Probability of directions by the lamp; 0 where only scattering counts.
+    share: f64,
+    /// Decides between the two.
+    u: f64,
+}
+
+/// A point of the light, or of the strongest lamp where the light is infinitely far.
+pub fn light_pivot(light: &Light, u: DVec2) -> DVec3 {
+    let on_plane = matches!(light.kind, LIGHT_TRIANGLE | LIGHT_QUAD | LIGHT_RECTANGLE);
+    let v = if on_plane { plane_light_point(light, u) } else { DVec2::ZERO };
+    let offset = if on_plane { light.edge_1 * v.x + light.edge_2 * v.y } else { DVec3::ZERO };
+    light.origin + offset
+}
+
+/// The aim of a vertex; glass is left to its own.
+pub fn find_aim(tables: &Tables, path: &Path, vertex: &Vertex) -> Aim {
+    let mut aim = Aim { axis: DVec3::Z, share: 0.0, u: 0.0 };
+    let may = vertex.in_medium || vertex.surface.flags & SURFACE_ORIENTED == 0;
+    if may && medium_at(tables, path.medium).equiangular > 0.0 {
+        let mut v = sample_set(tables, path, PIVOT_SET + path.segment + 1);
+        let light = &tables.lights[choose_light(tables, &mut v.x) as usize];
+        let way = light_pivot(light, v.zw()) - vertex.point;
+        let far = way.length();
+        if far > 0.0 {
+            aim = Aim { axis: way / far, share: AIMED_SHARE, u: v.y };
+        }
+    }
+    aim
+}
+
+/// Density of a direction that scattering has with the density `pdf`, by both ways to choose it.
+pub fn aimed_pdf(aim: &Aim, pdf: f64, direction: DVec3) -> f64 {
+    if aim.share > 0.0 { (1.0 - aim.share) * pdf + aim.share * toward_light_pdf(aim.axis, direction) } else { pdf }
+}
+
+/// The next direction, and its density by scattering alone.
+pub fn sample_next(tables: &Tables, vertex: &Vertex, aim: &Aim, u: DVec2, lobe: f64) -> (BsdfSample, f64) {
+    let mut next = sample_scattering(tables, vertex, u, lobe);
+    let mut scattered = next.pdf;
+    if aim.share > 0.0 {
+        let aimed = aim.u < aim.share;
+        if aimed || next.pdf > 0.0 {
+            if aimed {
+                next.direction = sample_toward_light(aim.axis, u);
+                next.eta = 1.0;
+            }
+            let value = eval_scattering(tables, vertex, next.direction);
+            scattered = value.pdf;
+            next.pdf = aimed_pdf(aim, value.pdf, next.direction);
+            next.weight = value.value / next.pdf;
+        } else {
+            next.weight /= 1.0 - aim.share;
+        }
+    }
+    (next, scattered)
+}
