@@ -7,8 +7,10 @@
 // Sets of random numbers that choose what a segment's sampling goes by: its direction, and then equiangular distances.
 const uint PIVOT_SET = 0x40000000u;
 
-// Share of directions that go by the lamp.
+// Share of directions that go by a small lamp...
 const float AIMED_SHARE = 0.25;
+// ...and half as many by one whose area is the squared distance over this: what a broad lamp brings varies little with direction.
+const float BROAD = 8.0;
 
 struct Aim {
     vec3 axis;      // to a point of the lamp
@@ -34,9 +36,12 @@ Aim find_aim(Path path, Vertex vertex) {
     if (HAS_EQUIANGULAR && may && MEDIUM(valid_medium(path.medium)).equiangular > 0.0) {
         // The next segment's numbers: its distances go by the same point.
         vec4 v = sample_set(path, PIVOT_SET + path.segment + 1u);
-        vec3 way = light_pivot(LIGHT(choose_light(v.x)), v.zw) - vertex.point;
-        float far = length(way);
-        aim = Aim(far > 0.0 ? way / far : aim.axis, far > 0.0 ? AIMED_SHARE : 0.0, v.y);
+        Light light = LIGHT(choose_light(v.x));
+        vec3 way = light_pivot(light, v.zw) - vertex.point;
+        float squared = dot(way, way);
+        if (squared > 0.0) {
+            aim = Aim(way * inversesqrt(squared), AIMED_SHARE * squared / (squared + BROAD * light.area), v.y);
+        }
     }
     return aim;
 }

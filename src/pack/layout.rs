@@ -322,7 +322,7 @@ gpu_struct! {
         probability: f32,
         /// Second edge, from the corner; the second axis of an environment map.
         edge_2: Vec3,
-        /// Area, canonical units²; 0 where it has no meaning.
+        /// Area, canonical units²; of a light infinitely far, that of the lamp at `origin`; 0 where it has no meaning.
         area: f32,
         /// Emitted radiance; the intensity of a point or spot; the irradiance of a directional light; the mean radiance of an
         /// environment map.

@@ -183,9 +183,9 @@ impl LightTable {
         let probabilities: Vec<f64> = self.powers.iter().zip(&near).map(probability).collect();
         let strongest =
             (0..count).filter(|&index| near[index]).max_by(|&a, &b| self.powers[a].total_cmp(&self.powers[b]));
-        if let Some(lamp) = strongest.map(|index| middle(&self.lights[index])) {
+        if let Some((place, area)) = strongest.map(|index| (middle(&self.lights[index]), self.lights[index].area)) {
             for (light, _) in self.lights.iter_mut().zip(&near).filter(|(_, near)| !**near) {
-                light.origin = lamp;
+                (light.origin, light.area) = (place, area);
             }
         }
         for ((light, probability), (threshold, alias)) in

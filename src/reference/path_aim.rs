@@ -12,8 +12,10 @@ use glam::{DVec2, DVec3, Vec4Swizzles};
 /// Sets of random numbers that choose what a segment's sampling goes by: its direction, and then equiangular distances.
 pub const PIVOT_SET: u32 = 0x4000_0000;
 
-/// Share of directions that go by the lamp.
+/// Share of directions that go by a small lamp...
 const AIMED_SHARE: f64 = 0.25;
+/// ...and half as many by one whose area is the squared distance over this: what a broad lamp brings varies little with direction.
+const BROAD: f64 = 8.0;
 
 /// What a vertex's next direction goes by.
 #[derive(Clone, Copy, Debug)]
@@ -42,9 +44,10 @@ pub fn find_aim(tables: &Tables, path: &Path, vertex: &Vertex) -> Aim {
         let mut v = sample_set(tables, path, PIVOT_SET + path.segment + 1);
         let light = &tables.lights[choose_light(tables, &mut v.x) as usize];
         let way = light_pivot(light, v.zw()) - vertex.point;
-        let far = way.length();
-        if far > 0.0 {
-            aim = Aim { axis: way / far, share: AIMED_SHARE, u: v.y };
+        let squared = way.length_squared();
+        if squared > 0.0 {
+            let share = AIMED_SHARE * squared / (squared + BROAD * light.area);
+            aim = Aim { axis: way / squared.sqrt(), share, u: v.y };
         }
     }
     aim
