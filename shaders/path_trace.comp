@@ -2,22 +2,18 @@
 //
 // A workgroup renders the samples of one tile of pixels. Its invocations take the next sample as soon as their path ends, so
 // none waits for another's long path; each sample has a place of its own, so the order does not matter. One flat loop serves
-// camera, extension and shadow rays: a few steps through the hierarchy, at most one primitive where a leaf is pending, and
-// once half of the rays that run in step are done, their paths' next rays. Answering a ray costs much more than a step, so it
-// waits for company: on lavapipe this takes a quarter off the time.
+// camera, extension and shadow rays.
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "lib/bindings.glsl"
 #include "lib/path.glsl"
-#include "lib/bvh.glsl"
+#include "lib/path_walk.glsl"
 #include "lib/film.glsl"
 
 layout(local_size_x = WORKGROUP) in;
 
 shared uint next_sample;
-
-const uint NODE_STEPS = 8u;
 
 void main() {
     if (gl_LocalInvocationIndex == 0u) {
@@ -39,29 +35,18 @@ void main() {
     Walk walk = Walk(0u, 0u, 0u);
     bool fresh = true; // the invocation has no path yet
     [[dont_unroll]] while (true) {
-        bool busy;
-        if (HAS_TREE) [[dont_unroll]] do {
-            [[dont_unroll]] for (uint k = 0u; k < NODE_STEPS; ++k) {
-                if (walk.node < walk.end && walk.leaf == 0u) {
-                    step_walk(NODE(walk.node), grid, hit.t, NODE_COPIES, walk);
-                }
-            }
-            if (walk.leaf != 0u) {
-                uint index = next_primitive(walk);
-                test_primitive(path, ray, index, PRIMITIVE(index), hit);
-                if (hit.blocked) {
-                    walk = Walk(walk.end, walk.end, 0u);
-                }
-            }
-            busy = walk.node < walk.end || walk.leaf != 0u;
-        } while (subgroupAdd(busy ? 1u : 0u) > gl_SubgroupSize / 2u);
-        if (walk.node >= walk.end && walk.leaf == 0u) {
+        if (walk_rays(path, ray, grid, walk, hit)) {
             if (!fresh) {
                 path_answer(path, hit);
             }
             if (!path.alive && !path.shadow) {
                 if (!fresh) {
-                    SAMPLE(turn * samples_in_tile + slot) = HAS_FILTER ? vec4(path.radiance * path.filter_weight, path.filter_weight) : vec4(path.radiance, 0.0);
+                    vec3 radiance = path.radiance;
+                    if (HAS_SHARING && path.sharing == 2u) {
+                        share_part(path, 3u, path.shared_direction);
+                        radiance = vec3(0.0);
+                    }
+                    SAMPLE(turn * samples_in_tile + slot) = HAS_FILTER ? vec4(radiance * path.filter_weight, path.filter_weight) : vec4(radiance, 0.0);
                     slot = atomicAdd(next_sample, 1u);
                 }
                 fresh = false;
@@ -76,18 +61,14 @@ void main() {
                 }
                 path.pixel = (pixel.y + params.crop_y) * params.film_width + pixel.x + params.crop_x;
                 path.sample_index = push.work.first_sample + slot % push.work.sample_count;
+                if (HAS_SHARING) {
+                    path.slot = turn * samples_in_tile + slot;
+                    SAMPLE(record_of(path.slot)) = vec4(0.0);
+                    SAMPLE(record_of(path.slot) + SECOND) = vec4(0.0);
+                }
                 path_start(path);
             }
-            hit = begin_hit(path);
-            ray.origin = path.origin;
-            ray.direction = path.direction;
-            orthonormal_frame(ray.direction, ray.tangent, ray.bitangent);
-            test_immediates(path, ray, hit);
-            if (HAS_TREE) {
-                grid = grid_ray(path.origin, path.direction, params.grid_origin, params.grid_step);
-                walk = start_walk(grid, params.node_count, NODE_COPIES);
-                walk.node = hit.blocked ? walk.end : walk.node;
-            }
+            begin_ray(path, ray, grid, walk, hit);
         }
     }
 }

@@ -19,7 +19,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Co
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer TexturesAddress { Texture at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ValuesAddress { float at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer GridsAddress { Grid at[]; };
-layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer SamplesAddress { vec4 at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer SamplesAddress { vec4 at[]; };
 layout(push_constant) uniform Push {
     NodesAddress nodes;
     PrimitivesAddress primitives;

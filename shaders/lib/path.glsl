@@ -17,6 +17,7 @@
 #include "lib/path_lights.glsl"
 #include "lib/path_rays.glsl"
 #include "lib/path_flight.glsl"
+#include "lib/path_share.glsl"
 #include "lib/camera.glsl"
 #include "lib/filter.glsl"
 #include "lib/outlook.glsl"
@@ -79,6 +80,8 @@ void path_start(inout Path path) {
         uint first = params.first_block + 4u * (block.y * params.block_columns + block.x);
         path.focus = vec3(VALUE(first), VALUE(first + 1u), VALUE(first + 2u));
     }
+    path.sharing = 0u;
+    path.before = vec3(1.0);
     path.left = NONE;
     path.crossings = 0u;
     path.medium = params.camera_medium;
@@ -94,7 +97,7 @@ bool goes_on(inout Path path, Vertex vertex) {
     outlook.worth = vec3(VALUE(first + 3u), VALUE(first + 4u), VALUE(first + 5u));
     path.foreseen = outlook.worth.x >= 0.0;
     vec3 throughput = vertex.in_medium ? path.throughput * vertex.albedo : path.throughput;
-    float keep = path.foreseen ? keep_by_outlook(outlook, throughput, path.focus) : 1.0;
+    float keep = path.foreseen ? keep_by_outlook(outlook, HAS_SHARING ? throughput * path.before : throughput, path.focus) : 1.0;
     // The second vertex has points of the table to itself, unless the other roulette begins so early.
     uint set = path.segment == 1u && RR_DEPTH > 1u ? 2u : 2u * path.segment + 2u;
     path.alive = sample_set(path, set).x < keep;
@@ -147,9 +150,10 @@ void scatter(inout Path path, Vertex vertex) {
 void next_segment(inout Path path) {
     path.segment += 1u;
     vec4 u = sample_set(path, 2u * path.segment);
-    if (path.depth >= RR_DEPTH) {
+    // A path whose second vertex is shared gets there.
+    if (path.depth >= RR_DEPTH && !(HAS_SHARING && path.depth < 2u)) {
         float most = path.depth < RELENTLESS_DEPTH ? 1.0 : 1.0 - 2.0 / float(path.depth);
-        float worth = 3.0 * max_component(path.throughput) * (HAS_DIELECTRIC ? path.eta_scale : 1.0);
+        float worth = 3.0 * max_component(HAS_SHARING ? path.throughput * path.before : path.throughput) * (HAS_DIELECTRIC ? path.eta_scale : 1.0);
         float keep = HAS_PILOT && path.foreseen ? most : min(worth, most);
         path.alive = path.alive && u.x < keep;
         path.throughput /= keep;
@@ -374,6 +378,9 @@ void path_light(inout Path path, Hit hit) {
             transmittance = float(hit.medium) == LIGHT(path.light).edge_1.y ? transmittance : vec3(0.0);
         }
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
+        if (HAS_SHARING && HAS_HENYEY_GREENSTEIN && path.sharing == 2u && path.depth == 2u) {
+            share_part(path, 1u, path.direction);
+        }
     }
     path.shadow = false;
 }
@@ -386,11 +393,20 @@ void path_answer(inout Path path, Hit hit) {
     } else {
         Vertex vertex;
         leaves = meet(path, hit, vertex);
+        if (HAS_SHARING && leaves && path.depth < 2u) {
+            share_vertex(path, vertex);
+        }
         if (HAS_PILOT && leaves && path.depth > 0u) {
             leaves = goes_on(path, vertex);
         }
+        if (HAS_SHARING && HAS_HENYEY_GREENSTEIN && path.sharing == 2u && path.depth == 1u) {
+            share_ended(path);
+        }
         if (leaves) {
             scatter(path, vertex);
+        }
+        if (HAS_SHARING && path.sharing == 2u && path.depth == 2u) {
+            path.shared_direction = path.next_direction;
         }
     }
     if (leaves && path.alive && !path.shadow) {

@@ -64,6 +64,11 @@ struct Path {
     vec3 normal;            // only valid when offset > 0
     uint left;              // the triangle on which the vertex lies, which its rays cannot meet again; else NONE
     uint next_medium;       // where dielectrics are: the medium of the next segment
+    // Where pixels share paths.
+    uint slot;              // of the sample, in the buffer
+    uint sharing;           // 1: the first vertex is kept; 2: the second one is, and radiance is that of a throughput of 1 from there
+    vec3 before;            // the throughput at the second vertex
+    vec3 shared_direction;  // in which the path left it
     // Roulette by a pilot.
     vec3 focus;             // one over the square of the pixel's radiance
     bool foreseen;          // the pilot knows the vertex

@@ -30,6 +30,9 @@ pub fn open(
     if with_pilot {
         pilot::run(&mut packed);
     }
+    if let Ok(n) = std::env::var("TYNDALL_SHARERS") {
+        packed.features.sharers = n.parse().expect("number");
+    }
     packed.warnings.iter().for_each(|warning| warn(warning));
     if choice == "reference" {
         return Ok(Box::new(reference::Renderer::new(packed)));
@@ -49,8 +52,8 @@ pub fn pack(scene: &Scene, seed: u32) -> Result<Packed, CliError> {
 }
 
 /// Bytes on the device and on the host that rendering takes beside the tables.
-pub fn working_memory(crop: [u32; 2]) -> (u64, u64) {
-    gpu::Renderer::working_memory(crop)
+pub fn working_memory(crop: [u32; 2], sharers: u32) -> (u64, u64) {
+    gpu::Renderer::working_memory(crop, sharers)
 }
 
 /// The Vulkan devices, in the order of their numbers. An empty list is not an error.

@@ -163,7 +163,7 @@ fn memory(scene: &Scene, packed: &Packed) -> Value {
         })
         .sum();
     let crop = scene.film.crop;
-    let (device_work, host_blocks) = backend::working_memory([crop.width, crop.height]);
+    let (device_work, host_blocks) = backend::working_memory([crop.width, crop.height], packed.features.sharers);
     // Sums and sums of squares of three channels in double precision.
     let film = u64::from(crop.width) * u64::from(crop.height) * size_of::<[[f64; 3]; 2]>() as u64;
     let (tables, meshes) = (tables as u64, meshes as u64);

@@ -11,8 +11,10 @@ use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Most samples in flight: their radiances take 16 bytes each.
-const MAX_SAMPLES: usize = 1 << 22;
+/// Most vectors of four numbers, of 16 bytes, for samples in flight: one each, and more where pixels share paths.
+const MAX_VECTORS: usize = 1 << 23;
+/// Vectors of the record of a path: RECORD in `lib/path_share.glsl`.
+const RECORD_VECTORS: usize = 12;
 /// Bindings of the path tracer; the first [`ADDRESSES`] can also be read by address.
 const BINDINGS: u32 = 13;
 const ADDRESSES: usize = 12;
@@ -24,6 +26,8 @@ const TILE_PIXELS: usize = (TILE * TILE) as usize;
 pub struct Renderer {
     device: Arc<Device>,
     path_trace: Kernel,
+    /// Where pixels share paths.
+    sharing: Option<Sharing>,
     resolve: Kernel,
     /// The tables that kernels only read, in the order of their bindings.
     tables: [Buffer; 11],
@@ -34,6 +38,12 @@ pub struct Renderer {
     crop: [u32; 2],
     /// Samples that `samples` holds.
     capacity: usize,
+}
+
+/// What connects the paths of a group of pixels. Their records lie behind the samples, and then the densities of connections.
+struct Sharing {
+    connect: Kernel,
+    share: Kernel,
 }
 
 impl Renderer {
@@ -53,6 +63,14 @@ impl Renderer {
         let push_size = ADDRESS_BYTES + size_of::<Dispatch>();
         let code = compile_cached(&expand("path_trace.comp", variant)?)?;
         let path_trace = Kernel::new(device, &code, BINDINGS, push_size as u32)?;
+        let kernel = |name: &str| -> Result<Kernel, Error> {
+            Kernel::new(device, &compile_cached(&expand(name, variant)?)?, BINDINGS, push_size as u32)
+        };
+        let sharers = variant.features.sharers as usize;
+        let sharing = match sharers {
+            0 => None,
+            _ => Some(Sharing { connect: kernel("connect.comp")?, share: kernel("share.comp")? }),
+        };
         let code = compile_cached(&expand("resolve.comp", variant)?)?;
         let resolve = Kernel::new(device, &code, 4, size_of::<Dispatch>() as u32)?;
         let tables = [
@@ -76,15 +94,17 @@ impl Renderer {
         }
         let crop = [packed.params.crop_width, packed.params.crop_height];
         let pixels = tile_count(crop) as usize * TILE_PIXELS;
-        let capacity = capacity(pixels);
+        let most = if variant.buffer_reference { u64::MAX } else { device.max_binding };
+        let capacity = capacity(pixels, sharers, most);
         Ok(Renderer {
             device: device.clone(),
             path_trace,
+            sharing,
             resolve,
             tables,
             params: Buffer::new(device, "params", &[packed.params])?,
-            samples: Buffer::zeroed::<[f32; 4]>(device, "samples", capacity)?,
-            sums: Buffer::zeroed::<[f32; 4]>(device, "sums", sums_length(pixels))?,
+            samples: Buffer::zeroed::<[f32; 4]>(device, "samples", capacity * vectors_of_sample(sharers))?,
+            sums: Buffer::zeroed::<[f32; 4]>(device, "sums", sums_length(pixels, capacity))?,
             invalid: Buffer::zeroed::<[u32; 4]>(device, "invalid", capacity / TILE_PIXELS)?,
             crop,
             capacity,
@@ -93,10 +113,11 @@ impl Renderer {
 
     /// Bytes that a crop window of so many pixels takes on the device, and on the host for the blocks of one dispatch; both
     /// beside the tables of the scene.
-    pub fn working_memory(crop: [u32; 2]) -> (u64, u64) {
+    pub fn working_memory(crop: [u32; 2], sharers: u32) -> (u64, u64) {
         let pixels = tile_count(crop) as usize * TILE_PIXELS;
-        let capacity = capacity(pixels);
-        let quads = capacity + sums_length(pixels) + capacity / TILE_PIXELS;
+        let capacity = capacity(pixels, sharers as usize, u64::MAX);
+        let of_samples = capacity * vectors_of_sample(sharers as usize);
+        let quads = of_samples + sums_length(pixels, capacity) + capacity / TILE_PIXELS;
         // A block has a sum and a sum of squares for each channel of a pixel.
         let blocks = (capacity / pixels / BLOCK_SAMPLES as usize).max(1);
         let block = u64::from(crop[0]) * u64::from(crop[1]) * size_of::<[[f32; 3]; 2]>() as u64;
@@ -112,6 +133,8 @@ impl Renderer {
             first_tile: tiles.start,
             tile_count,
             tile_step: coprime_step(tile_count),
+            first_record: self.capacity as u32,
+            first_pair: (self.capacity * (1 + RECORD_VECTORS)) as u32,
             ..Dispatch::default()
         };
         let buffers: Vec<&Buffer> = self.tables.iter().chain([&self.samples, &self.params]).collect();
@@ -123,6 +146,11 @@ impl Renderer {
         }
         let push = [bytemuck::cast_slice(&addresses), bytemuck::bytes_of(&work)].concat();
         self.path_trace.dispatch(&buffers, &push, tile_count)?;
+        if let Some(Sharing { connect, share }) = &mut self.sharing {
+            connect.dispatch(&buffers, &push, tile_count)?;
+            let samples = tile_count * TILE * TILE * work.sample_count;
+            share.dispatch(&buffers, &push, samples.div_ceil(self.device.subgroup_size))?;
+        }
 
         self.invalid.write(&vec![[0u32; 4]; blocks.len()]);
         let pixels = tile_count as usize * TILE_PIXELS;
@@ -200,14 +228,20 @@ fn render_all(renderer: &mut Renderer, samples: Range<u32>) -> Result<Vec<Block>
     Ok(blocks)
 }
 
-/// Samples in flight for so many pixels.
-fn capacity(pixels: usize) -> usize {
-    (pixels * 256).min(MAX_SAMPLES.max(BLOCK_SAMPLES as usize * TILE_PIXELS))
+/// Samples in flight for so many pixels, if a buffer may have `most` bytes.
+fn capacity(pixels: usize, sharers: usize, most: u64) -> usize {
+    let vectors = vectors_of_sample(sharers);
+    let fitting = usize::try_from(most / (16 * vectors as u64)).unwrap_or(usize::MAX);
+    (pixels * 256).min((MAX_VECTORS / vectors).min(fitting).max(BLOCK_SAMPLES as usize * TILE_PIXELS))
+}
+
+/// Vectors of four numbers that a sample takes.
+fn vectors_of_sample(sharers: usize) -> usize {
+    if sharers == 0 { 1 } else { 1 + RECORD_VECTORS + sharers }
 }
 
 /// Sums and sums of squares of the blocks in flight.
-fn sums_length(pixels: usize) -> usize {
-    let capacity = capacity(pixels);
+fn sums_length(pixels: usize, capacity: usize) -> usize {
     2 * capacity.div_ceil(BLOCK_SAMPLES as usize) + pixels.min(capacity) * 2
 }
 

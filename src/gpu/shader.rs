@@ -18,8 +18,10 @@ macro_rules! sources {
 }
 
 sources! {
+    "connect.comp",
     "path_trace.comp",
     "resolve.comp",
+    "share.comp",
     "lib/bindings.glsl",
     "lib/bsdf.glsl",
     "lib/bvh.glsl",
@@ -38,9 +40,11 @@ sources! {
     "lib/path_flight.glsl",
     "lib/path_lights.glsl",
     "lib/path_rays.glsl",
+    "lib/path_share.glsl",
     "lib/path_state.glsl",
     "lib/path_surface.glsl",
     "lib/path_vertex.glsl",
+    "lib/path_walk.glsl",
     "lib/phase.glsl",
     "lib/ray.glsl",
     "lib/rng.glsl",

@@ -96,6 +96,8 @@ pub struct Features {
     pub pilot: bool,
     /// A medium that no shadow ray leaves.
     pub sealed: bool,
+    /// Pixels that share their paths: 4, 8 or 16, or 0 where each pixel has only its own.
+    pub sharers: u32,
     /// Copies of the tree: 8 or 1.
     pub node_copies: u32,
     /// Primitives in the tree; without, all stand in the kernel.
@@ -169,6 +171,7 @@ impl Features {
             max_depth,
             rr_depth,
             pilot: false,
+            sharers: 0,
             sealed: packed.media.iter().any(|medium| medium.grids & MEDIUM_SEALED != 0),
             node_copies: packed.bvh.copies,
             tree: packed.immediate_count < packed.primitives.len(),
@@ -268,10 +271,11 @@ impl Features {
             ("HAS_TREE", self.tree),
             ("HAS_PILOT", self.pilot),
             ("HAS_SEALED", self.sealed),
+            ("HAS_SHARING", self.sharers > 0),
         ]
         .map(|(name, value)| format!("const bool {name} = {value};\n"))
         .concat();
-        let numbers = [("MAX_DEPTH", self.max_depth), ("RR_DEPTH", self.rr_depth), ("NODE_COPIES", self.node_copies)]
+        let numbers = [("MAX_DEPTH", self.max_depth), ("RR_DEPTH", self.rr_depth), ("NODE_COPIES", self.node_copies), ("SHARERS", self.sharers)]
             .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
             .concat();
         switches + &numbers

@@ -429,12 +429,12 @@ gpu_struct! {
         tile_count: u32,
         /// A step coprime to the number of tiles: workgroup `k` renders tile `k tile_step mod tile_count`.
         tile_step: u32,
+        /// Where pixels share paths: among the samples, the first vector of the records of the paths.
+        first_record: u32,
+        /// There, the first vector of the densities of connections.
+        first_pair: u32,
         /// Fills the sixteen bytes.
-        unused_1: u32,
-        /// Fills the sixteen bytes.
-        unused_2: u32,
-        /// Fills the sixteen bytes.
-        unused_3: u32,
+        unused: u32,
     }
 }
 

@@ -334,6 +334,7 @@ const EMPTY_FEATURES: Features = Features {
     max_depth: 0,
     rr_depth: 0,
     pilot: false,
+    sharers: 0,
     sealed: false,
     node_copies: 8,
     tree: true,

@@ -21,6 +21,7 @@ pub mod path_aim;
 pub mod path_flight;
 pub mod path_lights;
 pub mod path_rays;
+pub mod path_share;
 pub mod path_state;
 pub mod path_surface;
 pub mod path_vertex;

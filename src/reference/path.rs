@@ -14,6 +14,7 @@ use super::path_flight::{
     near_distance, pass_medium,
 };
 use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, sample_light};
+use super::path_share::{can_share, end_of};
 pub use super::path_rays::{begin_hit, test_primitive};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
@@ -166,7 +167,7 @@ fn next_segment(tables: &Tables, path: &mut Path) {
     let u = sample_set(tables, path, 2 * path.segment);
     if path.depth >= tables.features.rr_depth {
         let most = if path.depth < RELENTLESS_DEPTH { 1.0 } else { 1.0 - 2.0 / f64::from(path.depth) };
-        let worth = 3.0 * max_component(path.throughput) * path.eta_scale;
+        let worth = 3.0 * max_component(if path.sharing == 2 { path.throughput * path.before } else { path.throughput }) * path.eta_scale;
         let keep = if path.foreseen { most } else { worth.min(most) };
         path.alive = path.alive && u.x < keep;
         path.throughput /= keep;
@@ -371,6 +372,10 @@ fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
             transmittance *= f64::from(u8::from(f64::from(hit.medium) == light.edge_1.y));
         }
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
+        if path.sharing == 2 && path.depth == 2 {
+            path.handed.light = path.radiance;
+            path.radiance = DVec3::ZERO;
+        }
     }
     path.shadow = false;
 }
@@ -385,12 +390,35 @@ pub fn path_answer_seen(tables: &Tables, path: &mut Path, hit: &Hit, see: impl F
     if path.shadow {
         path_light(tables, path, hit);
     } else {
-        let Some(vertex) = meet(tables, path, hit) else { return };
+        let Some(mut vertex) = meet(tables, path, hit) else { return };
         see(path, &vertex);
+        if path.sharing == 100 && path.depth == 0 {
+            path.sharing = 0;
+            if can_share(tables, path, &vertex) {
+                path.handed.first = end_of(path, &vertex);
+                path.handed.weight = if vertex.in_medium { path.throughput * vertex.albedo } else { path.throughput * vertex.surface.reflectance };
+                path.sharing = if path.handed.weight == DVec3::ZERO { path.handed.first.kind = 0; 0 } else { 1 };
+            }
+        } else if path.sharing == 1 && path.depth == 1 {
+            path.sharing = 0;
+            if can_share(tables, path, &vertex) {
+                path.handed.second = end_of(path, &vertex);
+                path.handed.base = path.radiance;
+                path.radiance = DVec3::ZERO;
+                path.before = arriving_throughput(path, &vertex);
+                path.throughput = DVec3::ONE;
+                if vertex.in_medium { vertex.albedo = medium_at(tables, path.medium).albedo; }
+                path.sharing = 2;
+            }
+        }
         if tables.features.pilot && path.depth > 0 && !goes_on(tables, path, &vertex) {
             return;
         }
         scatter(tables, path, &vertex);
+        if path.sharing == 2 && path.depth == 2 {
+            path.handed.rest_direction = path.next_direction;
+            path.handed.light_direction = path.direction;
+        }
     }
     if path.alive && !path.shadow {
         next_segment(tables, path);

@@ -61,6 +61,10 @@ pub struct Path {
     pub pdf: f64,
     /// The same by scattering alone.
     pub scattered_pdf: f64,
+    /// Sharing.
+    pub handed: super::path_share::Handed,
+    pub sharing: u32,
+    pub before: DVec3,
     /// The path goes on behind the ray that is asked for.
     pub alive: bool,
     /// Where the path is; [`NONE`] where boundaries that contradict each other leave no medium.

@@ -1,0 +1,187 @@
+// Neighbouring pixels share their paths. Of each path the first two vertices are kept, and what the second one scatters. The first vertex
+// of every pixel of a group is then connected to the second vertices of all the others, so that a pixel has as many continuations as the
+// group has pixels, for one ray each instead of a path (Bekaert, Sbert and Halton 2002, "Accelerating path tracing by re-using paths").
+// The balance heuristic over the group (Veach and Guibas 1995) keeps the expectation of each pixel: second vertex j counts for pixel i with
+//
+//   p_i(j) / sum_k p_k(j),
+//
+// where p_k is the density with which the first vertex of k finds it, visibility and flight through the medium with it, so that no weight
+// exceeds 1 and no singularity is left. Only vertices that scatter in a way which is known without their place on a surface take part:
+// diffuse surfaces and media. All else is left to its own pixel.
+#include "lib/path_state.glsl"
+#include "lib/path_vertex.glsl"
+#include "lib/path_rays.glsl"
+
+// What the vertex of a path is for others.
+const uint END_NONE = 0u;
+const uint END_SURFACE = 1u;
+const uint END_MEDIUM = 2u;
+
+// Vectors of a record, which the second vertex begins at SECOND.
+const uint RECORD = 12u;
+const uint SECOND = 4u;
+const uint SENT = 6u;
+const uint BASE = 11u;
+
+const uint SHARE_COLUMNS = SHARERS == 16u ? 4u : 2u;
+const uint SHARE_ROWS = SHARERS == 4u ? 2u : 4u;
+// Pixels of a group are this far apart, so that their common noise does not show as blocks.
+const uint SHARE_STEP = 2u;
+
+// A vertex as others see it.
+struct End {
+    vec3 point;
+    uint kind;
+    vec3 axis;      // the normal on its side; in a medium, the direction of propagation
+    uint medium;    // where the path arrived through
+    float offset;   // of a surface: where rays begin and end
+};
+
+// What the second vertex sends back. All but `ended` depends on the direction, where the phase function does.
+struct Sent {
+    vec3 ended;
+    vec3 light;
+    vec3 light_direction;
+    vec3 rest;
+    vec3 rest_direction;
+};
+
+// The pixel of number n in the group of a pixel, and its own number.
+uvec2 sharer_pixel(uvec2 pixel, uint n) {
+    uvec2 size = SHARE_STEP * uvec2(SHARE_COLUMNS, SHARE_ROWS);
+    return pixel / size * size + pixel % SHARE_STEP + SHARE_STEP * uvec2(n % SHARE_COLUMNS, n / SHARE_COLUMNS);
+}
+
+uint sharer_number(uvec2 pixel) {
+    uvec2 place = pixel % (SHARE_STEP * uvec2(SHARE_COLUMNS, SHARE_ROWS)) / SHARE_STEP;
+    return place.y * SHARE_COLUMNS + place.x;
+}
+
+uint record_of(uint slot) {
+    return push.work.first_record + RECORD * slot;
+}
+
+uint pair_of(uint slot, uint n) {
+    return push.work.first_pair + SHARERS * slot + n;
+}
+
+void store_end(uint at, Path path, Vertex vertex) {
+    SAMPLE(at) = vec4(vertex.point, float(vertex.in_medium ? END_MEDIUM : END_SURFACE));
+    SAMPLE(at + 1u) = vec4(vertex.axis, float(path.medium));
+}
+
+End load_end(uint at, float offset) {
+    vec4 point = SAMPLE(at), axis = SAMPLE(at + 1u);
+    return End(point.xyz, uint(point.w), axis.xyz, uint(axis.w), offset);
+}
+
+bool can_share(Path path, Vertex vertex) {
+    if (vertex.in_medium) {
+        return !HAS_PHASES || vertex.phase == 0u;
+    }
+    bool diffuse = vertex.surface.flags >> SURFACE_KIND_SHIFT == BSDF_DIFFUSE;
+    bool plain = (vertex.surface.flags & SURFACE_SMOOTH) == 0u && vertex.surface.relief_texture == 0u;
+    return diffuse && plain && path.medium != NONE;
+}
+
+// Before the path scatters: keeps its first two vertices. From the second one on the path gathers radiance for a throughput of 1.
+void share_vertex(inout Path path, inout Vertex vertex) {
+    uint record = record_of(path.slot);
+    if (path.depth == 0u && can_share(path, vertex)) {
+        vec3 weight = path.throughput * (vertex.in_medium ? vertex.albedo : vertex.surface.reflectance);
+        if (max_component(weight) > 0.0) {
+            store_end(record, path, vertex);
+            SAMPLE(record + 2u) = vec4(weight, path.offset);
+            SAMPLE(record + 3u) = vec4(float(path.left & 0xffffu), float(path.left >> 16u), 0.0, 0.0);
+            path.sharing = 1u;
+        }
+    } else if (path.depth == 1u && path.sharing == 1u && can_share(path, vertex)) {
+        store_end(record + SECOND, path, vertex);
+        vec4 rest = SAMPLE(record + 3u);
+        SAMPLE(record + 3u) = vec4(rest.xy, HAS_MEDIA && !HAS_CHROMATIC ? path.tau : 0.0, path.offset);
+        SAMPLE(record + BASE) = vec4(path.radiance, 0.0);
+        path.radiance = vec3(0.0);
+        path.before = vertex.in_medium ? path.throughput * vertex.albedo : path.throughput;
+        path.throughput = vec3(1.0);
+        vertex.albedo = vertex.in_medium ? MEDIUM(valid_medium(path.medium)).albedo : vertex.albedo;
+        path.sharing = 2u;
+    }
+}
+
+// Keeps what a path brings that ends at its second vertex, and clears what has not come yet.
+void share_ended(inout Path path) {
+    uint at = record_of(path.slot) + SENT;
+    SAMPLE(at) = vec4(path.radiance, 0.0);
+    SAMPLE(at + 1u) = vec4(0.0);
+    SAMPLE(at + 2u) = vec4(0.0);
+    path.radiance = vec3(0.0);
+}
+
+// Keeps a part of what the second vertex sends, and begins the next.
+void share_part(inout Path path, uint part, vec3 direction) {
+    uint at = record_of(path.slot) + SENT + part;
+    SAMPLE(at) = vec4(path.radiance, 0.0);
+    SAMPLE(at + 1u) = vec4(direction, 0.0);
+    path.radiance = vec3(0.0);
+}
+
+Sent load_sent(uint record) {
+    Sent sent = Sent(vec3(0.0), vec3(0.0), vec3(0.0), SAMPLE(record + SENT + 3u).xyz, vec3(0.0));
+    if (HAS_HENYEY_GREENSTEIN) {
+        sent.ended = SAMPLE(record + SENT).xyz;
+        sent.light = SAMPLE(record + SENT + 1u).xyz;
+        sent.light_direction = SAMPLE(record + SENT + 2u).xyz;
+        sent.rest_direction = SAMPLE(record + SENT + 4u).xyz;
+    }
+    return sent;
+}
+
+// Asks for the ray from a first vertex to a second one. Returns whether the first could have found the second: `density` is that of the
+// place, without what lies on the way.
+bool begin_connection(inout Path path, End first, End second, out float density) {
+    vec3 way = second.point - first.point;
+    vec3 begin = first.point, end = second.point;
+    if (first.kind == END_SURFACE) {
+        begin += first.axis * (dot(first.axis, way) >= 0.0 ? first.offset : -first.offset);
+    }
+    if (second.kind == END_SURFACE) {
+        end += second.axis * (dot(second.axis, way) <= 0.0 ? second.offset : -second.offset);
+    }
+    way = end - begin;
+    float far = length(way);
+    path.origin = begin;
+    path.direction = way / far;
+    path.t_min = 0.0;
+    path.t_max = far;
+    path.last = NONE;
+    path.light = NONE - 1u; // no primitive has this light
+    path.medium = first.medium;
+    path.light_medium = first.medium;
+    path.shadow = true;
+    if (first.kind == END_SURFACE) {
+        density = max(dot(first.axis, path.direction), 0.0) * INV_PI;
+    } else {
+        density = HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(MEDIUM(first.medium).g, first.axis, path.direction) : INV_4PI;
+    }
+    density *= second.kind == END_SURFACE ? max(-dot(second.axis, path.direction), 0.0) : 1.0;
+    density /= far * far;
+    return far > 0.0 && density > 0.0;
+}
+
+// The density of a connection whose ray has been traced, of each channel, and for the flight of the first vertex, which chooses one.
+vec4 end_connection(Hit hit, End second, vec3 weight, float density) {
+    if (hit.blocked) {
+        return vec4(0.0);
+    }
+    vec3 passes = vec3(density);
+    if (HAS_MEDIA) {
+        passes *= HAS_CHROMATIC ? exp_minus(max(hit.tau_rgb, vec3(0.0))) : vec3(exp_minus(max(hit.tau, 0.0)));
+        passes *= second.kind == END_MEDIUM ? MEDIUM(second.medium).sigma_t : vec3(1.0);
+    }
+    return vec4(passes, HAS_CHROMATIC ? dot(channel_weights(weight), passes) : passes.x);
+}
+
+// The phase function of the second vertex for light from `from`.
+float phase_from(End second, vec3 from, vec3 direction) {
+    return eval_henyey_greenstein(MEDIUM(second.medium).g, normalize(second.point - from), direction);
+}
