@@ -1,5 +1,5 @@
-// Connects the first vertices of the pixels of a group to the second vertices of the others: lib/path_share.glsl. A workgroup traces the
-// rays of one tile, as in path_trace.comp.
+// Connects the first vertices of the pixels of a group to the second vertices of all: lib/path_share.glsl. A workgroup traces the rays of
+// one tile, as in path_trace.comp.
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
@@ -10,22 +10,24 @@
 
 layout(local_size_x = WORKGROUP) in;
 
-shared uint next_pair;
+shared uint next_sample;
 
 void main() {
     if (gl_LocalInvocationIndex == 0u) {
-        next_pair = WORKGROUP;
+        next_sample = 0u;
     }
     barrier();
-    uint samples_in_tile = TILE * TILE * push.work.sample_count;
+    uint count = push.work.sample_count, samples_in_tile = TILE * TILE * count;
     uint first_slot = gl_WorkGroupID.x * samples_in_tile;
-    uint tile = push.work.first_tile + gl_WorkGroupID.x;
-    uint pair = gl_LocalInvocationIndex;
-    bool asked = false;
-    uint place = 0u;
-    float density = 0.0;
+    uvec2 size = uvec2(params.crop_width, params.crop_height);
+    uvec2 corner = tile_pixel(push.work.first_tile + gl_WorkGroupID.x, 0u, params.crop_width);
+    // The sample whose first vertex is connected, and the number of the next pixel of its group.
+    uint slot = 0u, next = SHARERS, own = 0u, pairs = 0u, to = 0u;
+    uvec2 pixel = uvec2(0u);
+    End first, second;
     vec3 weight = vec3(0.0);
-    End second;
+    float density = 0.0;
+    bool asked = false;
     Path path;
     path.shadow = true;
     Hit hit;
@@ -35,40 +37,57 @@ void main() {
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {
             if (asked) {
-                SAMPLE(place) = end_connection(hit, second, weight, density);
+                store_pair(pairs, own, to, end_connection(hit, second, weight, density));
             }
             asked = false;
-            [[dont_unroll]] while (!asked && pair < samples_in_tile * SHARERS) {
-                uint slot = pair / SHARERS, n = pair % SHARERS;
-                uint pixel_in_tile = slot / push.work.sample_count;
-                uvec2 pixel = tile_pixel(tile, pixel_in_tile, params.crop_width), other = sharer_pixel(pixel, n);
-                bool inside = all(lessThan(max(pixel, other), uvec2(params.crop_width, params.crop_height)));
-                if (inside) {
-                    uint other_slot = (other.y % TILE * TILE + other.x % TILE) * push.work.sample_count + slot % push.work.sample_count;
-                    uint record = record_of(first_slot + slot), partner = record_of(first_slot + other_slot);
-                    vec4 rest = SAMPLE(record + 3u);
-                    vec4 weighted = SAMPLE(record + 2u);
-                    End first = load_end(record, weighted.w);
-                    second = load_end(partner + SECOND, SAMPLE(partner + 3u).w);
-                    place = pair_of(first_slot + slot, n);
-                    weight = weighted.xyz;
-                    path.left = uint(rest.x) | uint(rest.y) << 16u;
-                    asked = first.kind != END_NONE && second.kind != END_NONE;
-                    if (asked) {
+            [[dont_unroll]] while (!asked) {
+                if (next == SHARERS) {
+                    slot = atomicAdd(next_sample, 1u);
+                    if (slot >= samples_in_tile) {
+                        break;
+                    }
+                    uint in_tile = slot / count;
+                    uvec2 place = uvec2(in_tile % TILE, in_tile / TILE);
+                    pixel = corner + place;
+                    own = sharer_number(place);
+                    pairs = pairs_of(gl_WorkGroupID.x * (samples_in_tile / SHARERS) + group_in_tile(place) * count + slot % count);
+                    uint record = record_of(first_slot + slot);
+                    if (all(lessThan(pixel, size))) {
+                        first = load_end(record);
+                    } else {
+                        first.kind = END_NONE;
+                    }
+                    if (first.kind != END_NONE) {
+                        vec4 left = SAMPLE(record + 2u);
+                        path.left = uint(left.x) | uint(left.y) << 16u;
+                        if (HAS_CHROMATIC) {
+                            weight = SAMPLE(record + 3u).xyz;
+                        }
+                    }
+                    next = 0u;
+                }
+                to = next;
+                next += 1u;
+                uvec2 other = sharer_pixel(pixel, to);
+                if (first.kind != END_NONE && all(lessThan(other, size))) {
+                    uvec2 place = other - corner;
+                    uint record = record_of(first_slot + (place.y * TILE + place.x) * count + slot % count);
+                    second = load_end(record + SECOND);
+                    if (second.kind != END_NONE) {
                         asked = begin_connection(path, first, second, density);
-                    }
-                    bool own = asked && all(equal(pixel, other)) && !HAS_CHROMATIC;
-                    if (own) {
-                        // The path has been there.
-                        hit.blocked = false;
-                        hit.tau = rest.z;
-                        asked = false;
-                    }
-                    if (!asked) {
-                        SAMPLE(place) = own ? end_connection(hit, second, weight, density) : vec4(0.0);
+                        if (asked && to == own && !HAS_CHROMATIC) {
+                            // The path has been there.
+                            hit.blocked = false;
+                            hit.tau = SAMPLE(record + BASE).w;
+                            store_pair(pairs, own, to, end_connection(hit, second, weight, density));
+                            asked = false;
+                            continue;
+                        }
                     }
                 }
-                pair = atomicAdd(next_pair, 1u);
+                if (!asked) {
+                    store_pair(pairs, own, to, vec4(0.0));
+                }
             }
             if (!asked) {
                 break;

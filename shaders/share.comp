@@ -1,4 +1,4 @@
-// Adds to each sample what the second vertices of its group bring: lib/path_share.glsl.
+// Adds to the samples of each group what their second vertices bring: lib/path_share.glsl. An invocation serves one sample of a group.
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #include "lib/bindings.glsl"
@@ -7,62 +7,88 @@
 
 layout(local_size_x = WORKGROUP) in;
 
+bool is_something(vec3 v) {
+    return max_component(abs(v)) > 0.0 || !is_finite(v);
+}
+
 void main() {
-    uint slot = gl_GlobalInvocationID.x;
-    uint samples_in_tile = TILE * TILE * push.work.sample_count;
-    if (slot >= push.work.tile_count * samples_in_tile) {
+    uint count = push.work.sample_count, groups_in_tile = TILE * TILE / SHARERS;
+    uint number = gl_GlobalInvocationID.x;
+    if (number >= push.work.tile_count * groups_in_tile * count) {
         return;
     }
-    uint turn = slot / samples_in_tile, in_tile = slot % samples_in_tile;
-    uvec2 pixel = tile_pixel(push.work.first_tile + turn, in_tile / push.work.sample_count, params.crop_width);
-    if (pixel.x >= params.crop_width || pixel.y >= params.crop_height) {
-        return;
-    }
-    uint record = record_of(slot);
-    vec4 first = SAMPLE(record);
-    if (uint(first.w) == END_NONE) {
-        return;
-    }
-    vec3 weight = SAMPLE(record + 2u).xyz, sum = vec3(0.0);
-    uint own = sharer_number(pixel);
-    uint base = turn * samples_in_tile + in_tile % push.work.sample_count;
-    [[dont_unroll]] for (uint j = 0u; j < SHARERS; ++j) {
-        uvec2 other = sharer_pixel(pixel, j);
-        vec3 reaches = SAMPLE(pair_of(slot, j)).xyz;
-        if (other.x >= params.crop_width || other.y >= params.crop_height || max_component(reaches) == 0.0) {
-            continue;
+    uint turn = number / (groups_in_tile * count), group = number / count % groups_in_tile;
+    uvec2 corner = tile_pixel(push.work.first_tile + turn, 0u, params.crop_width), place = group_pixel(group);
+    uvec2 size = uvec2(params.crop_width, params.crop_height);
+    uint pairs = pairs_of(number);
+    // Of each pixel of the group: its slot, whether it has a first vertex, that vertex, and the sum.
+    uint slots[SHARERS];
+    bool finds[SHARERS];
+    vec3 points[SHARERS], sums[SHARERS];
+    for (uint i = 0u; i < SHARERS; ++i) {
+        uvec2 pixel = sharer_pixel(place, i);
+        slots[i] = (turn * TILE * TILE + pixel.y * TILE + pixel.x) * count + number % count;
+        vec4 first = vec4(0.0);
+        if (all(lessThan(corner + pixel, size))) {
+            first = SAMPLE(record_of(slots[i]));
         }
-        uint partner = record_of(base + (other.y % TILE * TILE + other.x % TILE) * push.work.sample_count);
-        End second = load_end(partner + SECOND, 0.0);
-        Sent sent = load_sent(partner);
-        bool turns = HAS_HENYEY_GREENSTEIN && second.kind == END_MEDIUM;
-        float of_place = 0.0, of_path = 0.0;
-        [[dont_unroll]] for (uint k = 0u; k < SHARERS; ++k) {
-            uvec2 third = sharer_pixel(pixel, k);
-            if (third.x < params.crop_width && third.y < params.crop_height) {
-                uint finder = base + (third.y % TILE * TILE + third.x % TILE) * push.work.sample_count;
-                float density = SAMPLE(pair_of(finder, j)).w;
-                if (density > 0.0) {
-                    of_place += density;
-                    of_path += turns ? density * phase_from(second, SAMPLE(record_of(finder)).xyz, sent.rest_direction) : density;
+        finds[i] = first.w > 0.0;
+        points[i] = first.xyz;
+        sums[i] = vec3(0.0);
+    }
+    [[dont_unroll]] for (uint j = 0u; j < SHARERS; ++j) {
+        vec4 densities[SHARERS];
+        float of_place = 0.0;
+        for (uint k = 0u; k < SHARERS; ++k) {
+            if (HAS_CHROMATIC) {
+                densities[k] = SAMPLE(pairs + SHARERS * j + k);
+            } else {
+                densities[k] = vec4(SAMPLE(pairs + SHARERS / 4u * j + k / 4u)[k % 4u]);
+            }
+            of_place += densities[k].w;
+        }
+        if (of_place > 0.0) {
+            uvec2 pixel = sharer_pixel(place, j);
+            uint record = record_of((turn * TILE * TILE + pixel.y * TILE + pixel.x) * count + number % count);
+            Sent sent = load_sent(record);
+            if (HAS_HENYEY_GREENSTEIN) {
+                End second = load_end(record + SECOND);
+                bool turns = second.kind == END_MEDIUM;
+                float g = MEDIUM(second.medium).g;
+                float found = turns ? eval_henyey_greenstein(g, second.axis, sent.light_direction) : 1.0;
+                float of_path = 0.0;
+                float phases[SHARERS];
+                for (uint k = 0u; k < SHARERS; ++k) {
+                    phases[k] = 1.0;
+                    if (turns && densities[k].w > 0.0) {
+                        phases[k] = eval_henyey_greenstein(g, normalize(second.point - points[k]), sent.rest_direction);
+                    }
+                    of_path += densities[k].w * phases[k];
+                }
+                vec3 ended = is_something(sent.ended) ? sent.ended / of_place : vec3(0.0);
+                vec3 light = is_something(sent.light) ? sent.light / (of_place * found) : vec3(0.0);
+                vec3 rest = is_something(sent.rest) ? sent.rest / of_path : vec3(0.0);
+                for (uint i = 0u; i < SHARERS; ++i) {
+                    float phase = turns ? eval_henyey_greenstein(g, normalize(second.point - points[i]), sent.light_direction) : 1.0;
+                    sums[i] += densities[i].w > 0.0 ? densities[i].xyz * (ended + light * phase + rest * phases[i]) : vec3(0.0);
+                }
+            } else if (is_something(sent.rest)) {
+                vec3 rest = sent.rest / of_place;
+                for (uint i = 0u; i < SHARERS; ++i) {
+                    sums[i] += densities[i].xyz * rest;
                 }
             }
         }
-        vec3 light = sent.light;
-        float phase = 1.0;
-        if (turns) {
-            phase = phase_from(second, first.xyz, sent.rest_direction);
-            float found = eval_henyey_greenstein(MEDIUM(second.medium).g, second.axis, sent.light_direction);
-            light *= max_component(light) > 0.0 ? phase_from(second, first.xyz, sent.light_direction) / found : 1.0;
+    }
+    for (uint i = 0u; i < SHARERS; ++i) {
+        if (finds[i]) {
+            uint record = record_of(slots[i]);
+            vec3 value = SAMPLE(record + 3u).xyz * sums[i];
+            if (SAMPLE(record + SECOND).w > 0.0) {
+                value += SAMPLE(record + BASE).xyz;
+            }
+            vec4 found = SAMPLE(slots[i]);
+            SAMPLE(slots[i]) = vec4(found.xyz + (HAS_FILTER ? value * found.w : value), found.w);
         }
-        vec3 ended_and_light = max_component(abs(sent.ended + light)) > 0.0 || !is_finite(sent.ended + light) ? (sent.ended + light) / of_place : vec3(0.0);
-        vec3 rest = max_component(abs(sent.rest)) > 0.0 || !is_finite(sent.rest) ? sent.rest * (phase / of_path) : vec3(0.0);
-        sum += reaches * (ended_and_light + rest);
     }
-    vec3 value = sum * weight;
-    if (uint(SAMPLE(record + SECOND).w) != END_NONE) {
-        value += SAMPLE(record + BASE).xyz;
-    }
-    vec4 sample_value = SAMPLE(slot);
-    SAMPLE(slot) = vec4(sample_value.xyz + (HAS_FILTER ? value * sample_value.w : value), sample_value.w);
 }

@@ -17,11 +17,11 @@ const uint END_NONE = 0u;
 const uint END_SURFACE = 1u;
 const uint END_MEDIUM = 2u;
 
-// Vectors of a record, which the second vertex begins at SECOND.
+// Vectors of a record: the first vertex in two, what its rays need, its weight; and then from here on:
+const uint SECOND = 4u; // the second vertex
+const uint SENT = 6u;   // what it sends: see Sent
+const uint BASE = 11u;  // radiance that came before it
 const uint RECORD = 12u;
-const uint SECOND = 4u;
-const uint SENT = 6u;
-const uint BASE = 11u;
 
 const uint SHARE_COLUMNS = SHARERS == 16u ? 4u : 2u;
 const uint SHARE_ROWS = SHARERS == 4u ? 2u : 4u;
@@ -34,7 +34,7 @@ struct End {
     uint kind;
     vec3 axis;      // the normal on its side; in a medium, the direction of propagation
     uint medium;    // where the path arrived through
-    float offset;   // of a surface: where rays begin and end
+    float offset;   // of a surface: of rays that begin or end here
 };
 
 // What the second vertex sends back. All but `ended` depends on the direction, where the phase function does.
@@ -61,18 +61,42 @@ uint record_of(uint slot) {
     return push.work.first_record + RECORD * slot;
 }
 
-uint pair_of(uint slot, uint n) {
-    return push.work.first_pair + SHARERS * slot + n;
+// Where the densities of a group's connections begin. `number` is that of the group, times samples.
+uint pairs_of(uint number) {
+    return push.work.first_pair + SHARERS * (HAS_CHROMATIC ? SHARERS : SHARERS / 4u) * number;
+}
+
+// The density of the second vertex of j by the first of i: of each channel, and as the flight of i chooses one.
+void store_pair(uint pairs, uint i, uint j, vec4 density) {
+    if (HAS_CHROMATIC) {
+        SAMPLE(pairs + SHARERS * j + i) = density;
+    } else {
+        SAMPLE(pairs + SHARERS / 4u * j + i / 4u)[i % 4u] = density.w;
+    }
+}
+
+// Number of the group of a pixel among those of a tile.
+uint group_in_tile(uvec2 in_tile) {
+    uvec2 size = SHARE_STEP * uvec2(SHARE_COLUMNS, SHARE_ROWS), block = in_tile / size, place = in_tile % SHARE_STEP;
+    return ((block.y * (TILE / size.x) + block.x) * SHARE_STEP + place.y) * SHARE_STEP + place.x;
+}
+
+// The first pixel of a group.
+uvec2 group_pixel(uint group) {
+    uvec2 size = SHARE_STEP * uvec2(SHARE_COLUMNS, SHARE_ROWS);
+    uint block = group / (SHARE_STEP * SHARE_STEP);
+    return uvec2(block % (TILE / size.x), block / (TILE / size.x)) * size + uvec2(group % SHARE_STEP, group / SHARE_STEP % SHARE_STEP);
 }
 
 void store_end(uint at, Path path, Vertex vertex) {
-    SAMPLE(at) = vec4(vertex.point, float(vertex.in_medium ? END_MEDIUM : END_SURFACE));
-    SAMPLE(at + 1u) = vec4(vertex.axis, float(path.medium));
+    uint kind = vertex.in_medium ? END_MEDIUM : END_SURFACE;
+    SAMPLE(at) = vec4(vertex.point, float(kind | path.medium << 2u));
+    SAMPLE(at + 1u) = vec4(vertex.axis, path.offset);
 }
 
-End load_end(uint at, float offset) {
+End load_end(uint at) {
     vec4 point = SAMPLE(at), axis = SAMPLE(at + 1u);
-    return End(point.xyz, uint(point.w), axis.xyz, uint(axis.w), offset);
+    return End(point.xyz, uint(point.w) & 3u, axis.xyz, uint(point.w) >> 2u, axis.w);
 }
 
 bool can_share(Path path, Vertex vertex) {
@@ -91,15 +115,13 @@ void share_vertex(inout Path path, inout Vertex vertex) {
         vec3 weight = path.throughput * (vertex.in_medium ? vertex.albedo : vertex.surface.reflectance);
         if (max_component(weight) > 0.0) {
             store_end(record, path, vertex);
-            SAMPLE(record + 2u) = vec4(weight, path.offset);
-            SAMPLE(record + 3u) = vec4(float(path.left & 0xffffu), float(path.left >> 16u), 0.0, 0.0);
+            SAMPLE(record + 2u) = vec4(float(path.left & 0xffffu), float(path.left >> 16u), 0.0, 0.0);
+            SAMPLE(record + 3u) = vec4(weight, 0.0);
             path.sharing = 1u;
         }
     } else if (path.depth == 1u && path.sharing == 1u && can_share(path, vertex)) {
         store_end(record + SECOND, path, vertex);
-        vec4 rest = SAMPLE(record + 3u);
-        SAMPLE(record + 3u) = vec4(rest.xy, HAS_MEDIA && !HAS_CHROMATIC ? path.tau : 0.0, path.offset);
-        SAMPLE(record + BASE) = vec4(path.radiance, 0.0);
+        SAMPLE(record + BASE) = vec4(path.radiance, HAS_MEDIA && !HAS_CHROMATIC ? path.tau : 0.0);
         path.radiance = vec3(0.0);
         path.before = vertex.in_medium ? path.throughput * vertex.albedo : path.throughput;
         path.throughput = vec3(1.0);
@@ -126,7 +148,7 @@ void share_part(inout Path path, uint part, vec3 direction) {
 }
 
 Sent load_sent(uint record) {
-    Sent sent = Sent(vec3(0.0), vec3(0.0), vec3(0.0), SAMPLE(record + SENT + 3u).xyz, vec3(0.0));
+    Sent sent = Sent(vec3(0.0), vec3(0.0), vec3(0.0), SAMPLE(record + SENT + 3u).xyz, vec3(0.0, 0.0, 1.0));
     if (HAS_HENYEY_GREENSTEIN) {
         sent.ended = SAMPLE(record + SENT).xyz;
         sent.light = SAMPLE(record + SENT + 1u).xyz;

@@ -36,6 +36,8 @@ pub struct Renderer {
     sums: Buffer,
     invalid: Buffer,
     crop: [u32; 2],
+    /// Pixels of a group; 0 where they share nothing.
+    sharers: u32,
     /// Samples that `samples` holds.
     capacity: usize,
 }
@@ -107,6 +109,7 @@ impl Renderer {
             sums: Buffer::zeroed::<[f32; 4]>(device, "sums", sums_length(pixels, capacity))?,
             invalid: Buffer::zeroed::<[u32; 4]>(device, "invalid", capacity / TILE_PIXELS)?,
             crop,
+            sharers: variant.features.sharers,
             capacity,
         })
     }
@@ -148,8 +151,8 @@ impl Renderer {
         self.path_trace.dispatch(&buffers, &push, tile_count)?;
         if let Some(Sharing { connect, share }) = &mut self.sharing {
             connect.dispatch(&buffers, &push, tile_count)?;
-            let samples = tile_count * TILE * TILE * work.sample_count;
-            share.dispatch(&buffers, &push, samples.div_ceil(self.device.subgroup_size))?;
+            let groups = tile_count * TILE * TILE / self.sharers * work.sample_count;
+            share.dispatch(&buffers, &push, groups.div_ceil(self.device.subgroup_size))?;
         }
 
         self.invalid.write(&vec![[0u32; 4]; blocks.len()]);

@@ -275,9 +275,14 @@ impl Features {
         ]
         .map(|(name, value)| format!("const bool {name} = {value};\n"))
         .concat();
-        let numbers = [("MAX_DEPTH", self.max_depth), ("RR_DEPTH", self.rr_depth), ("NODE_COPIES", self.node_copies), ("SHARERS", self.sharers)]
-            .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
-            .concat();
+        let numbers = [
+            ("MAX_DEPTH", self.max_depth),
+            ("RR_DEPTH", self.rr_depth),
+            ("NODE_COPIES", self.node_copies),
+            ("SHARERS", self.sharers),
+        ]
+        .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
+        .concat();
         switches + &numbers
     }
 }

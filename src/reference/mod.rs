@@ -42,6 +42,7 @@ use bvh::{grid_ray, next_primitive, start_walk, step_walk};
 use film::tile_pixel;
 use glam::DVec3;
 use path::{Path, begin_hit, path_answer, path_start, test_primitive};
+use path_share::{group_of, share, share_rest};
 use ray::Ray;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -69,14 +70,18 @@ impl Renderer {
             invalid: [0; 3],
         };
         let tiles = width.div_ceil(TILE) * height.div_ceil(TILE);
-        // In parallel by pixel, in the order of tiles; each pixel's samples in order, so the sums are always the same.
+        // In parallel by pixel or group of pixels, in the order of tiles; the samples of each in order, so the sums are always the same.
+        let sharers = self.tables.features.sharers;
         let pixels: Vec<(usize, PixelSums)> = (0..tiles * TILE * TILE)
             .into_par_iter()
             .filter_map(|slot| {
-                let [x, y] = tile_pixel(slot / (TILE * TILE), slot % (TILE * TILE), width);
-                let inside = x < width && y < height;
-                inside.then(|| ((y * width + x) as usize, self.pixel_sums(x, y, samples.clone())))
+                let pixel = tile_pixel(slot / (TILE * TILE), slot % (TILE * TILE), width);
+                let mut group = if sharers == 0 { vec![pixel] } else { group_of(pixel, sharers)? };
+                group.retain(|[x, y]| *x < width && *y < height);
+                let sums = self.group_sums(&group, samples.clone());
+                Some(group.into_iter().map(|[x, y]| (y * width + x) as usize).zip(sums).collect::<Vec<_>>())
             })
+            .flatten()
             .collect();
         for (index, pixel) in pixels {
             block.sums[index] = pixel.sum.as_vec3().to_array();
@@ -88,18 +93,21 @@ impl Renderer {
         block
     }
 
-    /// Mirror of `resolve.comp`.
-    fn pixel_sums(&self, x: u32, y: u32, samples: Range<u32>) -> PixelSums {
+    /// Mirror of `resolve.comp`, for pixels that share their paths, or a single one.
+    fn group_sums(&self, group: &[[u32; 2]], samples: Range<u32>) -> Vec<PixelSums> {
         let params = &self.tables.params;
-        let pixel = (y + params.crop_y) * params.film_width + x + params.crop_x;
-        let mut sums = PixelSums::default();
+        let index = |[x, y]: &[u32; 2]| (y + params.crop_y) * params.film_width + x + params.crop_x;
+        let pixels: Vec<u32> = group.iter().map(index).collect();
+        let mut sums: Vec<PixelSums> = group.iter().map(|_| PixelSums::default()).collect();
         for sample_index in samples {
-            let (value, filter_weight) = weighted_radiance(&self.tables, pixel, sample_index);
-            sums.sum += value;
-            sums.squares += value * value;
-            let positive = if filter_weight < 0.0 { -value } else { value };
-            if let Some(cause) = invalid_cause(positive, self.tables.features.pilot) {
-                sums.invalid[cause] += 1;
+            let values = weighted_radiances(&self.tables, &pixels, sample_index);
+            for (sums, (value, filter_weight)) in sums.iter_mut().zip(values) {
+                sums.sum += value;
+                sums.squares += value * value;
+                let positive = if filter_weight < 0.0 { -value } else { value };
+                if let Some(cause) = invalid_cause(positive, self.tables.features.pilot) {
+                    sums.invalid[cause] += 1;
+                }
             }
         }
         sums
@@ -144,19 +152,29 @@ pub fn sample_radiance(packed: &Packed, pixel: u32, sample_index: u32) -> DVec3 
     trace(&Tables::new(packed), pixel, sample_index)
 }
 
-/// Mirror of the loop of `path_trace.comp` for one sample: what it adds to its pixel.
+/// Mirror of the loop of `path_trace.comp` for one sample of a pixel that shares nothing: what it adds to its pixel.
 pub fn trace(tables: &Tables, pixel: u32, sample_index: u32) -> DVec3 {
-    weighted_radiance(tables, pixel, sample_index).0
+    weighted_radiances(tables, &[pixel], sample_index)[0].0
 }
 
-/// What a sample adds to its pixel, and its factor by the reconstruction filter, which may be negative.
-fn weighted_radiance(tables: &Tables, pixel: u32, sample_index: u32) -> (DVec3, f64) {
-    let mut path = path_start(tables, pixel, sample_index);
-    while path.alive || path.shadow {
-        let hit = traverse(tables, &path);
-        path_answer(tables, &mut path, &hit);
+/// What a sample adds to each pixel of a group, and its factor by the reconstruction filter, which may be negative.
+fn weighted_radiances(tables: &Tables, pixels: &[u32], sample_index: u32) -> Vec<(DVec3, f64)> {
+    let (mut values, mut records) = (Vec::new(), Vec::new());
+    for pixel in pixels {
+        let mut path = path_start(tables, *pixel, sample_index);
+        while path.alive || path.shadow {
+            let hit = traverse(tables, &path);
+            path_answer(tables, &mut path, &hit);
+        }
+        values.push((share_rest(&mut path) + path.record.base, path.filter_weight));
+        records.push(path.record);
     }
-    (path.radiance * path.filter_weight, path.filter_weight)
+    if tables.features.sharers > 0 {
+        for ((value, _), brought) in values.iter_mut().zip(share(tables, &records)) {
+            *value += brought;
+        }
+    }
+    values.into_iter().map(|(value, filter_weight)| (value * filter_weight, filter_weight)).collect()
 }
 
 /// Answers the ray that a path asks for.

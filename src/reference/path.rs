@@ -14,8 +14,8 @@ use super::path_flight::{
     near_distance, pass_medium,
 };
 use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, sample_light};
-use super::path_share::{can_share, end_of};
 pub use super::path_rays::{begin_hit, test_primitive};
+use super::path_share::{share_ended, share_light, share_vertex};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
     INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_lens, sample_set, survived_throughput,
@@ -79,6 +79,7 @@ pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     path.t_min = params.near_clip * depth_to_distance;
     path.far_end = params.far_clip * depth_to_distance;
     path.throughput = DVec3::ONE;
+    path.before = DVec3::ONE;
     path.radiance = DVec3::ZERO;
     path.alive = true;
     path.eta_scale = 1.0;
@@ -107,7 +108,7 @@ fn goes_on(tables: &Tables, path: &mut Path, vertex: &Vertex) -> bool {
     let outlook = Outlook { mean: three_values(tables, first), worth: three_values(tables, first + 3) };
     path.foreseen = outlook.worth.x >= 0.0;
     let throughput = arriving_throughput(path, vertex);
-    let keep = if path.foreseen { keep_by_outlook(&outlook, throughput, path.focus) } else { 1.0 };
+    let keep = if path.foreseen { keep_by_outlook(&outlook, throughput * path.before, path.focus) } else { 1.0 };
     let set = if path.segment == 1 && tables.features.rr_depth > 1 { 2 } else { 2 * path.segment + 2 };
     path.alive = sample_set(tables, path, set).x < keep;
     path.radiance += throughput * outlook.mean * if path.alive { 1.0 - 1.0 / keep } else { 1.0 };
@@ -165,9 +166,10 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
 fn next_segment(tables: &Tables, path: &mut Path) {
     path.segment += 1;
     let u = sample_set(tables, path, 2 * path.segment);
-    if path.depth >= tables.features.rr_depth {
+    // A path whose second vertex is shared gets there.
+    if path.depth >= tables.features.rr_depth && !(tables.features.sharers > 0 && path.depth < 2) {
         let most = if path.depth < RELENTLESS_DEPTH { 1.0 } else { 1.0 - 2.0 / f64::from(path.depth) };
-        let worth = 3.0 * max_component(if path.sharing == 2 { path.throughput * path.before } else { path.throughput }) * path.eta_scale;
+        let worth = 3.0 * max_component(path.throughput * path.before) * path.eta_scale;
         let keep = if path.foreseen { most } else { worth.min(most) };
         path.alive = path.alive && u.x < keep;
         path.throughput /= keep;
@@ -373,8 +375,7 @@ fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
         }
         path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
         if path.sharing == 2 && path.depth == 2 {
-            path.handed.light = path.radiance;
-            path.radiance = DVec3::ZERO;
+            share_light(path);
         }
     }
     path.shadow = false;
@@ -392,32 +393,20 @@ pub fn path_answer_seen(tables: &Tables, path: &mut Path, hit: &Hit, see: impl F
     } else {
         let Some(mut vertex) = meet(tables, path, hit) else { return };
         see(path, &vertex);
-        if path.sharing == 100 && path.depth == 0 {
-            path.sharing = 0;
-            if can_share(tables, path, &vertex) {
-                path.handed.first = end_of(path, &vertex);
-                path.handed.weight = if vertex.in_medium { path.throughput * vertex.albedo } else { path.throughput * vertex.surface.reflectance };
-                path.sharing = if path.handed.weight == DVec3::ZERO { path.handed.first.kind = 0; 0 } else { 1 };
-            }
-        } else if path.sharing == 1 && path.depth == 1 {
-            path.sharing = 0;
-            if can_share(tables, path, &vertex) {
-                path.handed.second = end_of(path, &vertex);
-                path.handed.base = path.radiance;
-                path.radiance = DVec3::ZERO;
-                path.before = arriving_throughput(path, &vertex);
-                path.throughput = DVec3::ONE;
-                if vertex.in_medium { vertex.albedo = medium_at(tables, path.medium).albedo; }
-                path.sharing = 2;
-            }
+        if tables.features.sharers > 0 {
+            share_vertex(tables, path, &mut vertex);
         }
-        if tables.features.pilot && path.depth > 0 && !goes_on(tables, path, &vertex) {
+        let leaves = !tables.features.pilot || path.depth == 0 || goes_on(tables, path, &vertex);
+        let second = path.sharing == 2 && path.depth == 1;
+        if second {
+            share_ended(path);
+        }
+        if !leaves {
             return;
         }
         scatter(tables, path, &vertex);
-        if path.sharing == 2 && path.depth == 2 {
-            path.handed.rest_direction = path.next_direction;
-            path.handed.light_direction = path.direction;
+        if second {
+            path.record.rest_direction = path.next_direction;
         }
     }
     if path.alive && !path.shadow {

@@ -1,144 +1,237 @@
-//! Mirror of `shaders/lib/path_share.glsl`: what neighbouring pixels learn from a path.
+//! Mirror of `shaders/lib/path_share.glsl`: neighbouring pixels share their paths. What is shared, and why the expectation of each
+//! pixel stays, is told there. `connect.comp` and `share.comp` are [`share`] here.
 
 use super::bindings::Tables;
-use super::math::exp_minus_rgb;
+use super::math::{exp_minus_rgb, max_component};
 use super::medium::channel_weights;
 use super::path_state::{Hit, NONE, Path, medium_at};
 use super::path_vertex::Vertex;
 use super::phase::eval_henyey_greenstein;
-use crate::pack::layout::*;
+use crate::pack::layout::{BSDF_DIFFUSE, SURFACE_KIND_SHIFT, SURFACE_SMOOTH};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-#[derive(Clone, Copy, Debug, Default)]
-pub struct End {
-    pub kind: u32, // 0 none, 1 surface, 2 medium
-    pub point: DVec3,
-    pub axis: DVec3,
-    pub medium: u32,
-    pub offset: f64,
-    pub left: u32,
+/// Pixels of a group are this far apart.
+const SHARE_STEP: u32 = 2;
+
+/// What a vertex is for others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kind {
+    /// Nothing to be shared.
+    #[default]
+    None,
+    /// A diffuse surface.
+    Surface,
+    /// A medium.
+    Medium,
 }
 
+/// A vertex as others see it.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Handed {
+pub struct End {
+    /// Where it is.
+    pub point: DVec3,
+    /// On what.
+    pub kind: Kind,
+    /// The normal on its side; in a medium, the direction of propagation.
+    pub axis: DVec3,
+    /// The one that the path arrived through.
+    pub medium: u32,
+    /// Of a surface: of rays that begin or end here.
+    pub offset: f64,
+}
+
+/// What is kept of a path for the others of its group.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Record {
+    /// The first vertex.
     pub first: End,
+    /// The triangle on which it lies, which its rays cannot meet again.
+    pub left: u32,
+    /// What the radiance that it scatters is multiplied with.
     pub weight: DVec3,
+    /// The second vertex.
     pub second: End,
+    /// Radiance that came before it.
     pub base: DVec3,
+    /// What the second vertex sends, if the path ends there by roulette; all here is for a throughput of 1.
     pub ended: DVec3,
+    /// What it sends of sampled light.
     pub light: DVec3,
+    /// From where that comes.
     pub light_direction: DVec3,
+    /// All that it sends besides.
     pub rest: DVec3,
+    /// From where that comes.
     pub rest_direction: DVec3,
 }
 
-pub fn can_share(tables: &Tables, path: &Path, vertex: &Vertex) -> bool {
+/// Columns and rows of a group.
+fn share_size(sharers: u32) -> [u32; 2] {
+    [if sharers == 16 { 4 } else { 2 }, if sharers == 4 { 2 } else { 4 }]
+}
+
+/// The pixels of the group that a pixel begins, if it does.
+pub fn group_of(pixel: [u32; 2], sharers: u32) -> Option<Vec<[u32; 2]>> {
+    let [columns, rows] = share_size(sharers);
+    let first = pixel[0] % (SHARE_STEP * columns) < SHARE_STEP && pixel[1] % (SHARE_STEP * rows) < SHARE_STEP;
+    let place = |n: u32| [pixel[0] + SHARE_STEP * (n % columns), pixel[1] + SHARE_STEP * (n / columns)];
+    first.then(|| (0..sharers).map(place).collect())
+}
+
+fn can_share(path: &Path, vertex: &Vertex) -> bool {
     if vertex.in_medium {
         return vertex.phase == 0;
     }
-    let _ = (tables, path);
-    vertex.surface.flags >> SURFACE_KIND_SHIFT == BSDF_DIFFUSE
-        && vertex.surface.flags & SURFACE_SMOOTH == 0
-        && vertex.surface.relief_texture == 0
+    let surface = &vertex.surface;
+    let plain = surface.flags & SURFACE_SMOOTH == 0 && surface.relief_texture == 0;
+    surface.flags >> SURFACE_KIND_SHIFT == BSDF_DIFFUSE && plain && path.medium != NONE
 }
 
-pub fn end_of(path: &Path, vertex: &Vertex) -> End {
-    End {
-        kind: if vertex.in_medium { 2 } else { 1 },
-        point: vertex.point,
-        axis: vertex.axis,
-        medium: path.medium,
-        offset: path.offset,
-        left: path.left,
+fn end_of(path: &Path, vertex: &Vertex) -> End {
+    let kind = if vertex.in_medium { Kind::Medium } else { Kind::Surface };
+    End { point: vertex.point, kind, axis: vertex.axis, medium: path.medium, offset: path.offset }
+}
+
+/// Before the path scatters: keeps its first two vertices. From the second one on the path gathers radiance for a throughput of 1.
+pub fn share_vertex(tables: &Tables, path: &mut Path, vertex: &mut Vertex) {
+    if path.depth == 0 && can_share(path, vertex) {
+        let weight = path.throughput * if vertex.in_medium { vertex.albedo } else { vertex.surface.reflectance };
+        if max_component(weight) > 0.0 {
+            path.record.first = end_of(path, vertex);
+            path.record.left = path.left;
+            path.record.weight = weight;
+            path.sharing = 1;
+        }
+    } else if path.depth == 1 && path.sharing == 1 && can_share(path, vertex) {
+        path.record.second = end_of(path, vertex);
+        path.record.base = path.radiance;
+        path.radiance = DVec3::ZERO;
+        path.before = if vertex.in_medium { path.throughput * vertex.albedo } else { path.throughput };
+        path.throughput = DVec3::ONE;
+        if vertex.in_medium {
+            vertex.albedo = medium_at(tables, path.medium).albedo;
+        }
+        path.sharing = 2;
     }
 }
 
-fn scatter_pdf(tables: &Tables, end: &End, direction: DVec3) -> f64 {
-    if end.kind == 2 {
-        eval_henyey_greenstein(medium_at(tables, end.medium).g, end.axis, direction)
-    } else {
-        end.axis.dot(direction).max(0.0) / PI
-    }
+/// Keeps what a path brings that ends at its second vertex.
+pub fn share_ended(path: &mut Path) {
+    path.record.ended = std::mem::take(&mut path.radiance);
 }
 
-/// Density (gray) and its vector form of the second vertex of `j` by the first of `i`.
-pub fn connect(tables: &Tables, i: &Handed, j: &Handed) -> DVec3 {
-    let a = i.first.point;
-    let side = |end: &End, d: DVec3| end.point + end.axis * if end.kind == 1 { end.offset * d.dot(end.axis).signum() } else { 0.0 };
-    let d0 = (j.second.point - a).normalize();
-    let origin = side(&i.first, d0);
-    let target = side(&j.second, -d0);
-    let way = target - origin;
+/// Keeps the light that was sampled at the second vertex.
+pub fn share_light(path: &mut Path) {
+    path.record.light = std::mem::take(&mut path.radiance);
+    path.record.light_direction = path.direction;
+}
+
+/// Keeps the rest at the end of the path, and returns the radiance that is left to its pixel alone.
+pub fn share_rest(path: &mut Path) -> DVec3 {
+    if path.sharing != 2 {
+        return path.radiance;
+    }
+    path.record.rest = path.radiance;
+    DVec3::ZERO
+}
+
+/// The ray from a first vertex to a second one, and the density of the place without what lies on the way; none if the first could
+/// not have found the second.
+fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(Path, f64)> {
+    let first = &record.first;
+    let way = second.point - first.point;
+    let (mut begin, mut end) = (first.point, second.point);
+    if first.kind == Kind::Surface {
+        begin += first.axis * if first.axis.dot(way) >= 0.0 { first.offset } else { -first.offset };
+    }
+    if second.kind == Kind::Surface {
+        end += second.axis * if second.axis.dot(way) <= 0.0 { second.offset } else { -second.offset };
+    }
+    let way = end - begin;
     let far = way.length();
     let direction = way / far;
-    let pdf = scatter_pdf(tables, &i.first, direction);
-    let cosine = if j.second.kind == 1 { -direction.dot(j.second.axis) } else { 1.0 };
-    if pdf <= 0.0 || cosine <= 0.0 {
-        return DVec3::ZERO;
-    }
-    let mut path = Path {
-        origin,
+    let mut density = match first.kind {
+        Kind::Surface => first.axis.dot(direction).max(0.0) / PI,
+        _ => eval_henyey_greenstein(medium_at(tables, first.medium).g, first.axis, direction),
+    };
+    density *= if second.kind == Kind::Surface { (-second.axis.dot(direction)).max(0.0) } else { 1.0 };
+    density /= far * far;
+    let path = Path {
+        origin: begin,
         direction,
-        t_max: far,
         t_min: 0.0,
+        t_max: far,
         last: NONE,
-        shadow: true,
+        // No primitive has this light.
         light: NONE - 1,
-        light_medium: i.first.medium,
-        left: i.first.left,
+        medium: first.medium,
+        light_medium: first.medium,
+        left: record.left,
+        shadow: true,
         ..Path::default()
     };
-    path.point = a;
-    let hit: Hit = super::traverse(tables, &path);
+    (far > 0.0 && density > 0.0).then_some((path, density))
+}
+
+/// The density of a connection in each channel, and as the flight of the first vertex chooses one.
+fn end_connection(tables: &Tables, hit: &Hit, second: &End, weight: DVec3, density: f64) -> (DVec3, f64) {
     if hit.blocked {
-        return DVec3::ZERO;
+        return (DVec3::ZERO, 0.0);
     }
-    let sigma = if j.second.kind == 2 { medium_at(tables, j.second.medium).sigma_t } else { DVec3::ONE };
-    exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO)) * sigma * (pdf * cosine / (far * far))
+    let mut passes = density * exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
+    if second.kind == Kind::Medium {
+        passes *= medium_at(tables, second.medium).sigma_t;
+    }
+    (passes, channel_weights(weight).dot(passes))
 }
 
-/// What the second vertex of `j` sends in a direction, in parts: by light sampling and ended; and the rest with density factor.
-pub fn sent(tables: &Tables, j: &Handed, from: DVec3) -> (DVec3, DVec3, f64) {
-    let arriving = (j.second.point - from).normalize();
-    if j.second.kind == 1 {
-        return (j.ended + j.light, j.rest, 1.0);
+/// Densities of the second vertex of `to` by the first of `from`.
+fn connect(tables: &Tables, from: &Record, to: &Record) -> (DVec3, f64) {
+    if from.first.kind == Kind::None || to.second.kind == Kind::None {
+        return (DVec3::ZERO, 0.0);
     }
-    let g = medium_at(tables, j.second.medium).g;
-    if g == 0.0 {
-        return (j.ended + j.light, j.rest, 1.0);
-    }
-    let phase = |axis: DVec3, d: DVec3| eval_henyey_greenstein(g, axis, d);
-    let own = j.second.axis;
-    let light = if j.light == DVec3::ZERO { DVec3::ZERO } else { j.light * phase(arriving, j.light_direction) / phase(own, j.light_direction) };
-    // rest = L · albedo with density phase(own)
-    let dens = if j.rest == DVec3::ZERO { 1.0 } else { phase(arriving, j.rest_direction) };
-    (j.ended + light, j.rest, dens)
+    let Some((path, density)) = begin_connection(tables, from, &to.second) else { return (DVec3::ZERO, 0.0) };
+    end_connection(tables, &super::traverse(tables, &path), &to.second, from.weight, density)
 }
 
-/// The samples of a group.
-pub fn combine(tables: &Tables, group: &[Handed]) -> Vec<DVec3> {
-    let n = group.len();
-    let mut p = vec![vec![DVec3::ZERO; n]; n];
-    for i in 0..n {
-        for j in 0..n {
-            if group[i].first.kind != 0 && group[j].second.kind != 0 {
-                p[i][j] = connect(tables, &group[i], &group[j]);
+/// The phase function of a second vertex for light that arrives along `axis`; 1 on a surface, which scatters alike to all sides.
+fn phase(tables: &Tables, second: &End, axis: DVec3, direction: DVec3) -> f64 {
+    match second.kind {
+        Kind::Medium => eval_henyey_greenstein(medium_at(tables, second.medium).g, axis, direction),
+        _ => 1.0,
+    }
+}
+
+/// What the second vertices of a group bring to each of its pixels.
+pub fn share(tables: &Tables, records: &[Record]) -> Vec<DVec3> {
+    let mut sums = vec![DVec3::ZERO; records.len()];
+    for to in records {
+        let densities: Vec<(DVec3, f64)> = records.iter().map(|from| connect(tables, from, to)).collect();
+        let of_place: f64 = densities.iter().map(|(_, density)| density).sum();
+        if of_place == 0.0 {
+            continue;
+        }
+        let towards = |from: &Record, direction: DVec3| {
+            phase(tables, &to.second, (to.second.point - from.first.point).normalize(), direction)
+        };
+        let found = phase(tables, &to.second, to.second.axis, to.light_direction);
+        let phases: Vec<f64> = (records.iter().zip(&densities))
+            .map(|(from, (_, density))| if *density > 0.0 { towards(from, to.rest_direction) } else { 0.0 })
+            .collect();
+        let of_path: f64 = densities.iter().zip(&phases).map(|((_, density), phase)| density * phase).sum();
+        let unless_zero = |v: DVec3, by: f64| if v == DVec3::ZERO { v } else { v / by };
+        let ended = unless_zero(to.ended, of_place);
+        let light = unless_zero(to.light, of_place * found);
+        let rest = unless_zero(to.rest, of_path);
+        for (((from, (reaches, density)), phase), sum) in records.iter().zip(&densities).zip(&phases).zip(&mut sums) {
+            if *density > 0.0 {
+                let lit = if light == DVec3::ZERO { light } else { light * towards(from, to.light_direction) };
+                *sum += *reaches * (ended + lit + rest * *phase);
             }
         }
     }
-    let mean = |i: usize, v: DVec3| if v == DVec3::ZERO { 0.0 } else { channel_weights(group[i].weight).dot(v) };
-    (0..n)
-        .map(|i| {
-            let mut sum = DVec3::ZERO;
-            for j in 0..n {
-                if p[i][j] == DVec3::ZERO { continue; }
-                let nee: f64 = (0..n).map(|k| mean(k, p[k][j])).sum();
-                let (light, rest, dens) = sent(tables, &group[j], group[i].first.point);
-                let cont: f64 = (0..n).map(|k| if p[k][j] == DVec3::ZERO { 0.0 } else { mean(k, p[k][j]) * sent(tables, &group[j], group[k].first.point).2 }).sum();
-                sum += p[i][j] * (light / nee + rest * dens / cont.max(1e-300));
-            }
-            sum * group[i].weight
-        })
-        .collect()
+    let brought =
+        |(record, sum): (&Record, DVec3)| if record.first.kind == Kind::None { sum } else { record.weight * sum };
+    records.iter().zip(sums).map(brought).collect()
 }

@@ -4,6 +4,7 @@ use super::bindings::{Medium, Tables};
 use super::light::{alias_keeps, alias_line};
 use super::math::{exp_minus_rgb, minus_log_1m};
 use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
+use super::path_share::Record;
 use super::sampler::{lens_key, point_index, set_key, shifted_point};
 use crate::pack::layout::{self, MEDIUM_HEIGHT, MEDIUM_VOXELS};
 use crate::pack::sobol::{LENS_SET, SOBOL_SETS};
@@ -61,9 +62,11 @@ pub struct Path {
     pub pdf: f64,
     /// The same by scattering alone.
     pub scattered_pdf: f64,
-    /// Sharing.
-    pub handed: super::path_share::Handed,
+    /// Where pixels share paths: what is kept of this one.
+    pub record: Record,
+    /// 1: the first vertex is kept; 2: the second one is, and radiance is that of a throughput of 1 from there.
     pub sharing: u32,
+    /// The throughput at the second vertex.
     pub before: DVec3,
     /// The path goes on behind the ray that is asked for.
     pub alive: bool,
