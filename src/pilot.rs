@@ -11,16 +11,30 @@
 //! Bolin and Meyer 1997). Rath et al. roll for a path's radiance, which costs its second moment; a path that ends with its
 //! expectation costs only its variance, so far more paths can end early. Whatever the pilot says, the expected image stays the same.
 //!
+//! It also finds how much of the variance is left to paths behind their second vertices, and lets pixels share those where it pays
+//! ([`crate::reference::path_share`]).
+//!
 //! The pilot has seeds of its own and depends on the scene alone, so the samples of a render can be split and merged as ever.
 
 use crate::pack::Packed;
+use crate::pack::features::Features;
 use crate::pack::layout::PILOT_CELLS;
 use crate::reference::bindings::Tables;
 use crate::reference::outlook::outlook_cell;
 use crate::reference::path::{arriving_throughput, path_answer_seen, path_start};
+use crate::reference::path_share::can_share;
 use crate::reference::traverse;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+
+/// Paths of each block, where only sharing is to be decided.
+const FEW_PATHS_PER_BLOCK: u32 = 4;
+/// The part of a render's variance before the second vertex is stratified so much better than that of the pilot.
+const OWN_STRATIFIED: f64 = 4.0;
+/// Of the pixels of a group, this share counts as if their paths were one's own.
+const SHARED_ALIKE: f64 = 0.7;
+/// What keeping paths and summing up costs, in units of a path.
+const SHARE_COST: f64 = 0.25;
 
 /// Films with fewer pixels are rendered before a pilot would be.
 const LEAST_PIXELS: usize = 4096;
@@ -62,7 +76,10 @@ struct Vertex {
 /// One path.
 struct Trail {
     block: usize,
+    /// What came behind the first vertex.
     radiance: DVec3,
+    /// What came behind the second, where both can be shared.
+    shared: DVec3,
     rays: f64,
     vertices: Vec<Vertex>,
 }
@@ -84,29 +101,41 @@ struct Blocks {
     rows: u32,
 }
 
-/// Runs a pilot and adds what it found to the tables of a scene. Scenes that gain nothing by it stay as they are.
-pub fn run(packed: &mut Packed) {
-    let large = packed.pixel_count() >= LEAST_PIXELS && packed.features.max_depth >= LEAST_MAX_DEPTH;
+/// Runs a pilot and adds what it found to the tables of a scene; pixels may then share their paths if `sharing` says so. Scenes that
+/// gain nothing by it stay as they are.
+pub fn run(packed: &mut Packed, sharing: bool) {
+    let features = &packed.features;
+    let large = packed.pixel_count() >= LEAST_PIXELS && features.max_depth >= LEAST_MAX_DEPTH;
     // Without a tree rays are so cheap that shorter paths hardly pay for the noise of their ends.
-    if !large || !packed.features.tree || packed.primitives.len() > MOST_PRIMITIVES {
+    let (sharing, roulette) = (sharing && can_share_paths(features), features.tree);
+    if !large || !(roulette || sharing) || packed.primitives.len() > MOST_PRIMITIVES {
         return;
     }
+    let rounds = if roulette { PATHS_PER_BLOCK } else { FEW_PATHS_PER_BLOCK };
     let mut tables = Tables::new(packed);
     tables.params.seed = SEED;
     let params = &packed.params;
     let side = params.crop_width.max(params.crop_height).div_ceil(MOST_BLOCKS);
     let blocks = Blocks { side, columns: params.crop_width.div_ceil(side), rows: params.crop_height.div_ceil(side) };
-    let trails = follow(&tables, blocks);
-    if let Some(found) = Found::of(&trails, blocks) {
+    let trails = follow(&tables, blocks, rounds);
+    let Some(view) = View::of(&trails, blocks) else { return };
+    packed.features.sharers = if sharing { view.best_sharers() } else { 0 };
+    if roulette && let Some(found) = Found::of(&trails, &view, packed.features.sharers) {
         found.add_to(packed, blocks);
     }
 }
 
+/// Whether the kernels can connect paths of different pixels in such a scene: the densities of equiangular distances depend on more than
+/// the two ends, and light through voxels and masks is known by chance only.
+fn can_share_paths(features: &Features) -> bool {
+    features.light_sampling && !features.equiangular && !features.grids && !features.masks
+}
+
 /// Follows one path for each block, and again until there are enough. The order of the result does not depend on the threads.
-fn follow(tables: &Tables, blocks: Blocks) -> Vec<Trail> {
+fn follow(tables: &Tables, blocks: Blocks, rounds: u32) -> Vec<Trail> {
     let mut trails = Vec::new();
     let mut rays = 0;
-    for round in 0..PATHS_PER_BLOCK {
+    for round in 0..rounds {
         let of_round: Vec<Trail> = (0..blocks.columns * blocks.rows)
             .into_par_iter()
             .map(|block| follow_one(tables, blocks, block, round))
@@ -131,10 +160,12 @@ fn follow_one(tables: &Tables, blocks: Blocks, block: u32, round: u32) -> Trail 
     let mut rays = 0;
     // With what the path had gathered, and after how many rays.
     let mut vertices: Vec<Vertex> = Vec::new();
+    let mut shares = 0;
     while (path.alive || path.shadow) && rays < MOST_RAYS_OF_A_PATH {
         rays += 1;
         let hit = traverse(tables, &path);
         path_answer_seen(tables, &mut path, &hit, |path, vertex| {
+            shares += usize::from(path.depth < 2 && can_share(path, vertex));
             vertices.push(Vertex {
                 point: vertex.point,
                 in_medium: vertex.in_medium,
@@ -145,13 +176,16 @@ fn follow_one(tables: &Tables, blocks: Blocks, block: u32, round: u32) -> Trail 
             });
         });
     }
+    let after =
+        |index: usize| vertices.get(index).map_or(DVec3::ZERO, |vertex: &Vertex| path.radiance - vertex.brought);
+    let (radiance, shared) = (after(0), if shares == 2 { after(1) } else { DVec3::ZERO });
     for vertex in &mut vertices {
         let gained = (path.radiance - vertex.brought) / vertex.throughput;
         vertex.brought = DVec3::select(vertex.throughput.cmpgt(DVec3::splat(1e-9)), gained, DVec3::ZERO);
         vertex.rays = f64::from(rays) - vertex.rays;
     }
     vertices.retain(|vertex| vertex.brought.is_finite() && vertex.point.is_finite());
-    Trail { block: block as usize, radiance: path.radiance, rays: f64::from(rays), vertices }
+    Trail { block: block as usize, radiance, shared, rays: f64::from(rays), vertices }
 }
 
 /// What the trails say.
@@ -164,35 +198,89 @@ struct Found {
     focus: Vec<DVec3>,
 }
 
-impl Found {
-    /// Nothing, if the image is black or has no variance, or if no path scatters.
-    fn of(trails: &[Trail], blocks: Blocks) -> Option<Found> {
+/// The image as the trails show it.
+struct View {
+    /// Of each block one over the square of its radiance.
+    focus: Vec<DVec3>,
+    /// Relative variance of a path.
+    variance: f64,
+    /// The same of what comes before its second vertex, and behind it.
+    own: f64,
+    shared: f64,
+    /// Of a path.
+    rays: f64,
+}
+
+impl View {
+    /// Nothing, if the image is black or has no variance. Lamps that are seen directly do not count: the dark pixels beside them do.
+    fn of(trails: &[Trail], blocks: Blocks) -> Option<View> {
         let finite = || trails.iter().filter(|trail| trail.radiance.is_finite());
         let count = finite().count() as f64;
         let mean = finite().map(|trail| trail.radiance).sum::<DVec3>() / count;
         let floor = FLOOR * mean.element_sum() / 3.0;
-        let mut sums = vec![(DVec3::ZERO, 0.0); (blocks.columns * blocks.rows) as usize];
-        for trail in finite() {
-            let (sum, count) = &mut sums[trail.block];
-            *sum += trail.radiance;
-            *count += 1.0;
-        }
-        let of_block: Vec<DVec3> = sums.iter().map(|(sum, count)| *sum / f64::max(*count, 1.0)).collect();
-        let focus: Vec<DVec3> =
-            of_block.iter().map(|mean| (*mean * *mean + DVec3::splat(floor * floor)).recip()).collect();
-        let relative = |trail: &Trail| {
-            let difference = trail.radiance - of_block[trail.block];
-            (difference * difference * focus[trail.block]).element_sum() / 3.0
+        let of_blocks = |part: &dyn Fn(&Trail) -> DVec3| -> Vec<DVec3> {
+            let mut sums = vec![(DVec3::ZERO, 0.0); (blocks.columns * blocks.rows) as usize];
+            for trail in finite() {
+                let (sum, count) = &mut sums[trail.block];
+                *sum += part(trail);
+                *count += 1.0;
+            }
+            sums.iter().map(|(sum, count)| *sum / f64::max(*count, 1.0)).collect()
         };
-        let variance = finite().map(relative).sum::<f64>() / count;
+        let focus: Vec<DVec3> = (of_blocks(&|trail| trail.radiance).iter())
+            .map(|mean| (*mean * *mean + DVec3::splat(floor * floor)).recip())
+            .collect();
+        let variance = |part: &dyn Fn(&Trail) -> DVec3| {
+            let means = of_blocks(part);
+            let relative = |trail: &Trail| {
+                let difference = part(trail) - means[trail.block];
+                (difference * difference * focus[trail.block]).element_sum() / 3.0
+            };
+            finite().map(relative).sum::<f64>() / count
+        };
+        let (all, shared) = (variance(&|trail| trail.radiance), variance(&|trail| trail.shared));
+        let own = variance(&|trail| trail.radiance - trail.shared);
         let rays = trails.iter().map(|trail| trail.rays).sum::<f64>() / trails.len() as f64;
+        let known = floor > 0.0 && all > 0.0 && all.is_finite();
+        known.then_some(View { focus, variance: all, own, shared, rays })
+    }
+
+    /// Variance with groups of so many pixels, as far as a render has it.
+    fn variance_with(&self, sharers: u32) -> f64 {
+        self.own / OWN_STRATIFIED + self.shared / alike(sharers)
+    }
+
+    /// Pixels of the groups that bring the least variance times time.
+    fn best_sharers(&self) -> u32 {
+        let time = |sharers: u32| match sharers {
+            0 => 1.0,
+            _ => 1.0 + SHARE_COST + f64::from(sharers - 1) / self.rays,
+        };
+        let cost = |sharers: u32| self.variance_with(sharers) * time(sharers);
+        [0, 4, 8, 16].into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(0)
+    }
+}
+
+/// As how many paths of its own a pixel has those of its group.
+fn alike(sharers: u32) -> f64 {
+    1.0 + SHARED_ALIKE * f64::from(sharers.max(1) - 1)
+}
+
+impl Found {
+    /// Nothing, if no path scatters.
+    fn of(trails: &[Trail], view: &View, sharers: u32) -> Option<Found> {
+        // Where a group shares the rest of a path, its variance counts so much less; and a sample takes more rays.
+        let (variance, rays) = match sharers {
+            0 => (view.variance, view.rays),
+            _ => (view.variance_with(sharers) * alike(sharers), view.rays + f64::from(sharers - 1)),
+        };
         let efficiency = STRATIFIED * rays / variance;
         let (origin, scale) = cells_of_space(trails)?;
-        if !(efficiency.is_finite() && floor > 0.0 && scale.is_finite()) {
+        if !(efficiency.is_finite() && scale.is_finite()) {
             return None;
         }
         let cells = cells(trails, origin, scale);
-        Some(Found { origin, scale, cells: weigh(&cells, efficiency), focus })
+        Some(Found { origin, scale, cells: weigh(&cells, efficiency), focus: view.focus.clone() })
     }
 
     fn add_to(&self, packed: &mut Packed, blocks: Blocks) {

@@ -246,6 +246,9 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         path.normal = path.direction;
         path.left = NONE;
         vertex.point = flight_point(path, primitive, side, end.way);
+        if (HAS_SHARING && !HAS_CHROMATIC) {
+            path.tau += medium.sigma_t.x * end.way;
+        }
         vertex.g = medium.g;
         vertex.phase = medium.phase;
         vertex.albedo = HAS_GRIDS ? end.weight * albedo_factor(medium, vertex.point) : end.weight;

@@ -28,6 +28,9 @@ const uint SHARE_ROWS = SHARERS == 4u ? 2u : 4u;
 // Pixels of a group are this far apart, so that their common noise does not show as blocks.
 const uint SHARE_STEP = 2u;
 
+// Rays end this many times the offset of rays that leave a surface before it.
+const float END_MARGIN = 4.0;
+
 // A vertex as others see it.
 struct End {
     vec3 point;
@@ -167,7 +170,9 @@ bool begin_connection(inout Path path, End first, End second, out float density)
         begin += first.axis * (dot(first.axis, way) >= 0.0 ? first.offset : -first.offset);
     }
     if (second.kind == END_SURFACE) {
-        end += second.axis * (dot(second.axis, way) <= 0.0 ? second.offset : -second.offset);
+        // The distance to the surface itself is rounded as well as its points are.
+        float margin = END_MARGIN * second.offset;
+        end += second.axis * (dot(second.axis, way) <= 0.0 ? margin : -margin);
     }
     way = end - begin;
     float far = length(way);

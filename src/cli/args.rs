@@ -76,6 +76,9 @@ pub struct RenderArgs {
     /// Russian roulette by the throughput alone, without a pilot run that finds out where paths are worth their time
     #[arg(long)]
     pub no_pilot: bool,
+    /// Each pixel has paths of its own: more noise, but independent from pixel to pixel
+    #[arg(long)]
+    pub no_sharing: bool,
     /// Also write an 8-bit sRGB PNG to look at
     #[arg(long, value_name = "OUT.png")]
     pub preview: Option<PathBuf>,

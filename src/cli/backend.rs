@@ -18,21 +18,24 @@ pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Loaded, CliEr
 }
 
 /// Opens the device that `choice` names ("auto" for the best one, a part of its name, its number in [`list`], or "reference"
-/// for the CPU) and prepares it for the crop window of `scene`, after a pilot run if `with_pilot`. Warnings go to `warn`.
+/// for the CPU) and prepares it for the crop window of `scene`, after a pilot run if `with_pilot`, by which
+/// pixels may share their paths if `sharing`. Warnings go to `warn`.
 pub fn open(
     choice: &str,
     scene: &Scene,
     seed: u32,
     with_pilot: bool,
+    sharing: bool,
     warn: &mut dyn FnMut(&str),
 ) -> Result<Box<dyn Backend>, CliError> {
     let mut packed = Packed::new(scene, seed).map_err(|error| CliError::Scene(error.to_string()))?;
     if with_pilot {
-        pilot::run(&mut packed);
+        pilot::run(&mut packed, sharing);
     }
     if let Ok(n) = std::env::var("TYNDALL_SHARERS") {
         packed.features.sharers = n.parse().expect("number");
     }
+    if std::env::var_os("TYNDALL_SHOW").is_some() { eprintln!("sharers {}", packed.features.sharers); }
     packed.warnings.iter().for_each(|warning| warn(warning));
     if choice == "reference" {
         return Ok(Box::new(reference::Renderer::new(packed)));

@@ -38,7 +38,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
         doubts(args, &scene);
     }
 
-    let mut backend = backend::open(&args.device, &scene, args.seed, !args.no_pilot, &mut warn)?;
+    let mut backend = backend::open(&args.device, &scene, args.seed, !args.no_pilot, !args.no_sharing, &mut warn)?;
     // From here on a signal leads to an image. Before, it simply ends the program.
     let interrupt = interrupt::flag()?;
     render(args, &scene, spp, &mut *backend, &interrupt, &output)

@@ -14,6 +14,9 @@ use std::f64::consts::PI;
 /// Pixels of a group are this far apart.
 const SHARE_STEP: u32 = 2;
 
+/// Rays end this many times the offset of rays that leave a surface before it.
+const END_MARGIN: f64 = 4.0;
+
 /// What a vertex is for others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kind {
@@ -79,7 +82,8 @@ pub fn group_of(pixel: [u32; 2], sharers: u32) -> Option<Vec<[u32; 2]>> {
     first.then(|| (0..sharers).map(place).collect())
 }
 
-fn can_share(path: &Path, vertex: &Vertex) -> bool {
+/// Whether a vertex scatters in a way that is known without its place on a surface.
+pub fn can_share(path: &Path, vertex: &Vertex) -> bool {
     if vertex.in_medium {
         return vertex.phase == 0;
     }
@@ -146,7 +150,8 @@ fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(P
         begin += first.axis * if first.axis.dot(way) >= 0.0 { first.offset } else { -first.offset };
     }
     if second.kind == Kind::Surface {
-        end += second.axis * if second.axis.dot(way) <= 0.0 { second.offset } else { -second.offset };
+        let margin = END_MARGIN * second.offset;
+        end += second.axis * if second.axis.dot(way) <= 0.0 { margin } else { -margin };
     }
     let way = end - begin;
     let far = way.length();
