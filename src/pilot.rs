@@ -31,10 +31,12 @@ use rayon::prelude::*;
 const FEW_PATHS_PER_BLOCK: u32 = 4;
 /// The part of a render's variance before the second vertex is stratified so much better than that of the pilot.
 const OWN_STRATIFIED: f64 = 4.0;
-/// Of the pixels of a group, this share counts as if their paths were one's own.
-const SHARED_ALIKE: f64 = 0.7;
-/// What keeping paths and summing up costs, in units of a path.
-const SHARE_COST: f64 = 0.25;
+/// A group of M pixels has the variance of M to this power paths of one's own (measured: .65 to .76).
+const ALIKE_EXPONENT: f64 = 0.7;
+/// What keeping paths and summing up costs, in units of a path (measured: .3).
+const SHARE_COST: f64 = 0.3;
+/// A connection's ray takes this share of the time of a path's own ray, where they go through a tree (measured: .55 to .7).
+const CONNECTION_COST: f64 = 0.6;
 
 /// Films with fewer pixels are rendered before a pilot would be.
 const LEAST_PIXELS: usize = 4096;
@@ -118,7 +120,7 @@ pub fn run(packed: &mut Packed, sharing: bool) {
     let side = params.crop_width.max(params.crop_height).div_ceil(MOST_BLOCKS);
     let blocks = Blocks { side, columns: params.crop_width.div_ceil(side), rows: params.crop_height.div_ceil(side) };
     let trails = follow(&tables, blocks, rounds);
-    let Some(view) = View::of(&trails, blocks) else { return };
+    let Some(view) = View::of(&trails, blocks, roulette) else { return };
     packed.features.sharers = if sharing { view.best_sharers() } else { 0 };
     if roulette && let Some(found) = Found::of(&trails, &view, packed.features.sharers) {
         found.add_to(packed, blocks);
@@ -127,7 +129,7 @@ pub fn run(packed: &mut Packed, sharing: bool) {
 
 /// Whether the kernels can connect paths of different pixels in such a scene: the densities of equiangular distances depend on more than
 /// the two ends, and light through voxels and masks is known by chance only.
-fn can_share_paths(features: &Features) -> bool {
+pub fn can_share_paths(features: &Features) -> bool {
     features.light_sampling && !features.equiangular && !features.grids && !features.masks
 }
 
@@ -209,11 +211,13 @@ struct View {
     shared: f64,
     /// Of a path.
     rays: f64,
+    /// Time of a connection over that of a path.
+    connection: f64,
 }
 
 impl View {
     /// Nothing, if the image is black or has no variance. Lamps that are seen directly do not count: the dark pixels beside them do.
-    fn of(trails: &[Trail], blocks: Blocks) -> Option<View> {
+    fn of(trails: &[Trail], blocks: Blocks, tree: bool) -> Option<View> {
         let finite = || trails.iter().filter(|trail| trail.radiance.is_finite());
         let count = finite().count() as f64;
         let mean = finite().map(|trail| trail.radiance).sum::<DVec3>() / count;
@@ -242,7 +246,8 @@ impl View {
         let own = variance(&|trail| trail.radiance - trail.shared);
         let rays = trails.iter().map(|trail| trail.rays).sum::<f64>() / trails.len() as f64;
         let known = floor > 0.0 && all > 0.0 && all.is_finite();
-        known.then_some(View { focus, variance: all, own, shared, rays })
+        let connection = if tree { CONNECTION_COST } else { 1.0 } / rays;
+        known.then_some(View { focus, variance: all, own, shared, rays, connection })
     }
 
     /// Variance with groups of so many pixels, as far as a render has it.
@@ -254,16 +259,16 @@ impl View {
     fn best_sharers(&self) -> u32 {
         let time = |sharers: u32| match sharers {
             0 => 1.0,
-            _ => 1.0 + SHARE_COST + f64::from(sharers - 1) / self.rays,
+            _ => 1.0 + SHARE_COST + f64::from(sharers - 1) * self.connection,
         };
         let cost = |sharers: u32| self.variance_with(sharers) * time(sharers);
-        [0, 4, 8, 16].into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(0)
+        [0, 4, 8].into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(0)
     }
 }
 
 /// As how many paths of its own a pixel has those of its group.
 fn alike(sharers: u32) -> f64 {
-    1.0 + SHARED_ALIKE * f64::from(sharers.max(1) - 1)
+    f64::from(sharers.max(1)).powf(ALIKE_EXPONENT)
 }
 
 impl Found {
@@ -272,7 +277,10 @@ impl Found {
         // Where a group shares the rest of a path, its variance counts so much less; and a sample takes more rays.
         let (variance, rays) = match sharers {
             0 => (view.variance, view.rays),
-            _ => (view.variance_with(sharers) * alike(sharers), view.rays + f64::from(sharers - 1)),
+            _ => {
+                let time = view.rays * (1.0 + f64::from(sharers - 1) * view.connection);
+                (view.variance_with(sharers) * alike(sharers), time)
+            }
         };
         let efficiency = STRATIFIED * rays / variance;
         let (origin, scale) = cells_of_space(trails)?;

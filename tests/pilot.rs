@@ -19,7 +19,7 @@ const SIDE: u32 = 64;
 /// With a pilot, which only scenes with a tree have.
 fn piloted(scene: &Scene) -> Packed {
     let mut packed = scenes::pack(scene, 3).with_immediates(0);
-    pilot::run(&mut packed);
+    pilot::run(&mut packed, false);
     packed
 }
 
@@ -125,6 +125,6 @@ fn little_images_and_short_paths_have_no_pilot() {
         assert!(!packed.features.pilot && packed.values == scenes::pack(&scene, 3).values, "{name}");
     }
     let mut without_tree = scenes::pack(&large(scenes::gray_box()), 3);
-    pilot::run(&mut without_tree);
+    pilot::run(&mut without_tree, false);
     assert!(!without_tree.features.tree && !without_tree.features.pilot);
 }

@@ -23,7 +23,7 @@ const uint SENT = 6u;   // what it sends: see Sent
 const uint BASE = 11u;  // radiance that came before it
 const uint RECORD = 12u;
 
-const uint SHARE_COLUMNS = SHARERS == 16u ? 4u : 2u;
+const uint SHARE_COLUMNS = 2u;
 const uint SHARE_ROWS = SHARERS == 4u ? 2u : 4u;
 // Pixels of a group are this far apart, so that their common noise does not show as blocks.
 const uint SHARE_STEP = 2u;

@@ -96,7 +96,7 @@ pub struct Features {
     pub pilot: bool,
     /// A medium that no shadow ray leaves.
     pub sealed: bool,
-    /// Pixels that share their paths: 4, 8 or 16, or 0 where each pixel has only its own.
+    /// Pixels that share their paths: 4 or 8, or 0 where each pixel has only its own.
     pub sharers: u32,
     /// Copies of the tree: 8 or 1.
     pub node_copies: u32,
@@ -153,7 +153,11 @@ impl Features {
             }),
             anisotropic: packed.surfaces.iter().any(|surface| surface.alpha != surface.alpha_v),
             shading_normals: flag(SURFACE_SMOOTH),
-            masks: flag(SURFACE_MASK),
+            // Boundaries of media let everything pass; they are no masks.
+            masks: packed.primitives.iter().any(|primitive| {
+                let index = primitive.surface & !(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE);
+                primitive.surface & PRIMITIVE_BOUNDARY == 0 && packed.surfaces[index as usize].flags & SURFACE_MASK != 0
+            }),
             far_clip: {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01

@@ -71,7 +71,7 @@ pub struct Record {
 
 /// Columns and rows of a group.
 fn share_size(sharers: u32) -> [u32; 2] {
-    [if sharers == 16 { 4 } else { 2 }, if sharers == 4 { 2 } else { 4 }]
+    [2, if sharers == 4 { 2 } else { 4 }]
 }
 
 /// The pixels of the group that a pixel begins, if it does.

@@ -1,0 +1,117 @@
+//! Pixels that share their paths: the kernels against the reference, and that sharing changes no expectation.
+
+mod common;
+
+use common::scenes::{self, v};
+use common::statistics::mean_and_error;
+use common::{device, images};
+use glam::DVec3;
+use tyndall::gpu::shader::Variant;
+use tyndall::pack::Packed;
+use tyndall::pilot;
+use tyndall::scene::{Film, Integrator, ReconstructionFilter, Scene, Shape};
+
+const SIDE: u32 = 64;
+
+/// The scenes whose paths can be shared, on a film that ends within a tile and within a group.
+fn cases(side: u32) -> Vec<(&'static str, Scene)> {
+    let mut cases = scenes::all();
+    let mut wide = scenes::gray_box();
+    wide.film.filter = ReconstructionFilter::Gaussian { stddev: 0.5 };
+    let mut eager = scenes::nested_media();
+    eager.integrator = Integrator { rr_depth: 1, ..eager.integrator };
+    cases.extend([("wide filter", wide), ("eager roulette", eager)]);
+    for (_, scene) in &mut cases {
+        scene.film = Film { filter: scene.film.filter, ..Film::new(side, side) };
+    }
+    cases.retain(|(_, scene)| pilot::can_share_paths(&scenes::pack(scene, 1).features));
+    assert!(cases.len() >= 6, "{} scenes", cases.len());
+    cases
+}
+
+fn shared(packed: &Packed, sharers: u32) -> Packed {
+    let mut packed = packed.clone();
+    packed.features.sharers = sharers;
+    packed
+}
+
+#[test]
+fn device_and_reference_share_alike() {
+    for (index, (name, scene)) in cases(21).into_iter().enumerate() {
+        let sharers = [8, 4][index % 2];
+        let packed = shared(&scenes::pack(&scene, 7), sharers);
+        let (device, reference) = (images::on_device(&packed, 4), images::by_reference(&packed, 4));
+        let share = images::compare(&device, &reference).unwrap_or_else(|why| panic!("{name}: {why}"));
+        eprintln!("{name}, {sharers}: {:.2} % of the pixels agree", share * 100.0);
+        images::compare(&device, &images::on_device(&scenes::pack(&scene, 7), 4))
+            .expect_err("what is not shared differs");
+    }
+}
+
+#[test]
+fn the_two_forms_of_the_kernels_share_alike() {
+    let packed = shared(&scenes::pack(&cases(21)[0].1, 7), 8);
+    let variant = |buffer_reference| Variant {
+        features: packed.features,
+        immediates: packed.immediates().to_vec(),
+        workgroup: device().subgroup_size,
+        buffer_reference,
+    };
+    let [one, two] = [false, true].map(|form| images::mean(&images::with_variant(&packed, 4, &variant(form))));
+    images::compare(&one, &two).unwrap();
+}
+
+/// Means of the tiles of an image: pixels of a group have common noise, tiles have none.
+fn tiles(image: &[DVec3]) -> Vec<DVec3> {
+    let mut sums = vec![DVec3::ZERO; (SIDE / 8 * SIDE / 8) as usize];
+    for (index, pixel) in (0..).zip(image) {
+        sums[(index / SIDE / 8 * (SIDE / 8) + index % SIDE / 8) as usize] += *pixel / 64.0;
+    }
+    sums
+}
+
+/// z-values of the mean relative difference, and its largest standard error.
+fn differences(one: &[DVec3], two: &[DVec3]) -> ([f64; 3], f64) {
+    let brightness = two.iter().sum::<DVec3>() / two.len() as f64;
+    let mut coarsest = 0.0f64;
+    let z = std::array::from_fn(|channel| {
+        let floor = 0.1 * brightness[channel];
+        let relative = |(a, b): (&DVec3, &DVec3)| (a[channel] - b[channel]) / (b[channel] + floor);
+        let (mean, error) = mean_and_error(&one.iter().zip(two).map(relative).collect::<Vec<f64>>());
+        coarsest = coarsest.max(error);
+        mean / error
+    });
+    (z, coarsest)
+}
+
+#[test]
+fn sharing_changes_no_expectation() {
+    for (index, (name, scene)) in cases(SIDE).into_iter().enumerate() {
+        let sharers = [4, 8][index % 2];
+        let truth = tiles(&images::on_device(&scenes::pack(&scene, 4), 64));
+        let image = tiles(&images::on_device(&shared(&scenes::pack(&scene, 5), sharers), 64));
+        let (z, coarsest) = differences(&image, &truth);
+        eprintln!("{name}, {sharers}: z = {z:.2?}, standard errors below {:.2} %", coarsest * 100.0);
+        assert!(z.iter().all(|z| z.abs() < 4.0), "{name}: z = {z:?}");
+        let brighter: Vec<DVec3> = image.iter().map(|tile| *tile * v(1.05, 1.05, 1.05)).collect();
+        let (z, _) = differences(&brighter, &truth);
+        assert!(z.iter().any(|z| z.abs() > 4.0), "{name}: 5 % more would be seen, z = {z:?}");
+    }
+}
+
+#[test]
+fn a_pilot_shares_where_it_pays() {
+    let mut packed = scenes::pack(&cases(SIDE)[0].1, 3);
+    pilot::run(&mut packed, true);
+    assert!(packed.features.sharers > 0);
+    let mut alone = scenes::pack(&cases(SIDE)[0].1, 3);
+    pilot::run(&mut alone, false);
+    assert_eq!(alone.features.sharers, 0);
+    // A floor under a lamp: light that is scattered twice is rare.
+    let mut open = Scene::new(scenes::camera(4.0), Film::new(SIDE, SIDE));
+    let floor = scenes::quad(v(-3.0, -1.0, 3.0), DVec3::X * 6.0, DVec3::NEG_Z * 6.0);
+    open.shapes.extend([Shape::diffuse("floor", floor, DVec3::splat(0.5)), scenes::lamp()]);
+    let mut packed = scenes::pack(&open, 3);
+    pilot::run(&mut packed, true);
+    assert_eq!(packed.features.sharers, 0);
+}
