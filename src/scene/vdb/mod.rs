@@ -16,6 +16,12 @@ use bytes::Bytes;
 pub(super) use nano::is_nano;
 pub(super) use open::is_open;
 
+/// Numbers of a box that are accepted however few voxels of it are active: 256 MiB.
+const ALWAYS: u64 = 1 << 26;
+/// Beyond that, at least one voxel in so many must be active. A smaller share is a stray voxel far away from the others, or a damaged
+/// file, and would take gigabytes for nothing.
+const LEAST_SHARE: u64 = 256;
+
 /// Reads a grid of a file `.nvdb`: that of a name, or the only one, or the one called "density". Also returns what takes the unit
 /// cube to the file's world space. The error says what is wrong, and at which byte.
 pub(super) fn read_nano(data: &[u8], name: Option<&str>) -> Result<(Grid, DMat4), String> {
@@ -152,6 +158,14 @@ impl Sparse {
                 u32::MAX
             ));
         };
+        let active = self.active();
+        if count > ALWAYS && count / self.channels as u64 > active.saturating_mul(LEAST_SHARE) {
+            return Err(format!(
+                "its {active} active voxels are scattered over a box of {x} x {y} x {z}, {:.1} GiB without gaps; at least one in \
+                 {LEAST_SHARE} must be active: remove stray voxels, or cut it into pieces",
+                count as f64 * 4.0 / f64::from(1 << 30)
+            ));
+        }
         let mut values: Vec<f32> = Vec::new();
         if values.try_reserve_exact(count as usize).is_err() {
             return Err(format!("there is no memory for its {x} x {y} x {z} voxels of {} channels", self.channels));
@@ -169,6 +183,14 @@ impl Sparse {
             return Err(format!("its transform has no inverse: {}", self.to_world));
         }
         Ok((Grid::new(size.map(|side| side as usize), self.channels, values)?, to_world))
+    }
+
+    /// How many voxels are active.
+    fn active(&self) -> u64 {
+        let tiles = self.tiles.iter().filter(|tile| tile.active).map(|tile| 1u64 << (3 * tile.log_side));
+        let leaves =
+            self.leaves.iter().map(|leaf| leaf.active.iter().map(|word| u64::from(word.count_ones())).sum::<u64>());
+        tiles.sum::<u64>() + leaves.sum::<u64>()
     }
 
     /// Writes tiles and leaves, as far as they are in the range.
