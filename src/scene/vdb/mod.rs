@@ -38,9 +38,9 @@ pub(super) fn read_open(data: &[u8], name: Option<&str>) -> Result<(Grid, DMat4)
     let bytes = Bytes::of_file(data);
     let entries = open::list(&bytes)?;
     let names: Vec<&str> = entries.iter().map(|entry| entry.name.as_str()).collect();
-    let entry = &entries[choose(&names, name)?];
-    let about = |cause| format!("grid \"{}\": {cause}", entry.name);
-    open::read(&bytes, entry).and_then(Sparse::dense).map_err(about)
+    let index = choose(&names, name)?;
+    let about = |cause| format!("grid \"{}\": {cause}", names[index]);
+    open::read(&bytes, &entries, index).and_then(Sparse::dense).map_err(about)
 }
 
 /// Which of the grids is meant.

@@ -23,6 +23,8 @@ const HALF: &str = "_HalfFloat";
 /// A grid of a file.
 pub(super) struct Entry {
     pub name: String,
+    /// The name with a number, if there are several of it.
+    unique: String,
     /// Of the tree, as "Tree_float_5_4_3".
     kind: String,
     /// Whose tree this grid shows, if not its own.
@@ -61,7 +63,7 @@ pub(super) fn list(bytes: &Bytes) -> Result<Vec<Entry>, String> {
         if end < file.at + 24 || at < file.at + 24 {
             return Err(file.error(format!("the grid \"{name}\" is before its own head")));
         }
-        entries.push(Entry { name, kind, parent, at });
+        entries.push(Entry { name, unique, kind, parent, at });
         file.at = end;
     }
     Ok(entries)
@@ -81,21 +83,40 @@ fn metadata(file: &mut Cursor) -> Result<Option<String>, String> {
     Ok(class)
 }
 
-/// The voxels of a grid.
-pub(super) fn read(bytes: &Bytes, entry: &Entry) -> Result<Sparse, String> {
-    let mut file = Cursor { bytes: bytes.clone(), at: entry.at };
-    let (kind, half) = match entry.kind.strip_suffix(HALF) {
-        Some(kind) => (kind, true),
-        None => (entry.kind.as_str(), false),
-    };
-    let channels = match kind {
+/// The voxels of one of the grids.
+pub(super) fn read(bytes: &Bytes, entries: &[Entry], index: usize) -> Result<Sparse, String> {
+    let entry = &entries[index];
+    let (mut file, mut compression, to_world) = head(bytes, entry)?;
+    if !entry.parent.is_empty() {
+        // A grid that shares its tree has its own transform, and nothing after it.
+        let parent = entries.iter().find(|other| other.unique == entry.parent && other.parent.is_empty());
+        let parent = parent.ok_or_else(|| {
+            bytes.error(entry.at, format!("it shares the voxels of \"{}\", which is not there", entry.parent))
+        })?;
+        (file, compression, _) = head(bytes, parent)?;
+    }
+    let half = entry.kind.ends_with(HALF);
+    let channels = match entry.kind.trim_end_matches(HALF) {
         "Tree_float_5_4_3" => 1,
         "Tree_vec3s_5_4_3" => 3,
-        _ => {
+        kind => {
             let text = format!("its type is {kind}; Tree_float_5_4_3 and Tree_vec3s_5_4_3 are accepted");
-            return Err(file.error(text));
+            return Err(bytes.error(entry.at, text));
         }
     };
+    if file.u32()? != 1 {
+        return Err(file.error("a tree of several buffers"));
+    }
+    let sparse = Sparse { channels, background: [0.0; 3], tiles: Vec::new(), leaves: Vec::new(), to_world };
+    let mut tree = Tree { file, half, compression, sparse };
+    tree.topology()?;
+    tree.voxels()?;
+    Ok(tree.sparse)
+}
+
+/// Compression and transform of a grid, and where its tree begins.
+fn head<'a>(bytes: &Bytes<'a>, entry: &Entry) -> Result<(Cursor<'a>, u32, DMat4), String> {
+    let mut file = Cursor { bytes: bytes.clone(), at: entry.at };
     let compression = file.u32()?;
     if compression & !(ZIP | ACTIVE_ONLY | BLOSC) != 0 {
         return Err(bytes.error(entry.at, format!("compression {compression:#x}; bits 0 to 2 are known")));
@@ -105,18 +126,7 @@ pub(super) fn read(bytes: &Bytes, entry: &Entry) -> Result<Sparse, String> {
         return Err(bytes.error(entry.at, format!("it is a {class}; fog volumes are accepted")));
     }
     let to_world = transform(&mut file)?;
-    if !entry.parent.is_empty() {
-        let text = format!("it shares the voxels of \"{}\": write it as a grid of its own", entry.parent);
-        return Err(file.error(text));
-    }
-    if file.u32()? != 1 {
-        return Err(file.error("a tree of several buffers"));
-    }
-    let sparse = Sparse { channels, background: [0.0; 3], tiles: Vec::new(), leaves: Vec::new(), to_world };
-    let mut tree = Tree { file, half, compression, sparse };
-    tree.topology()?;
-    tree.voxels()?;
-    Ok(tree.sparse)
+    Ok((file, compression, to_world))
 }
 
 /// From indices to world space.
