@@ -117,13 +117,12 @@ mod tests {
     fn blocks_are_unpacked_and_their_bytes_sorted() {
         assert_eq!(unpack(&buffer(STORED, 4, 3, 3, b"abc"), 3).unwrap(), b"abc");
         // One block of two shuffled numbers of three bytes and one byte that is left over, as literals of LZ4.
-        let lz4 = b"\x50adbec\x20";
         let literals = [&[0x70][..], b"adbecfX"].concat();
         let stream = |data: &[u8]| [&20u32.to_le_bytes()[..], &(data.len() as u32).to_le_bytes(), data].concat();
         let packed = buffer(SHUFFLED | NOT_SPLIT | 1 << 5, 3, 7, 7, &stream(&literals));
         assert_eq!(unpack(&packed, 7).unwrap(), b"abcdefX");
         let refused = |packed: &[u8], wanted| unpack(packed, wanted).expect_err("it is wrong");
-        assert!(refused(&buffer(SHUFFLED | 1 << 5, 3, 7, 7, &stream(lz4)), 7).contains("LZ4"));
+        assert!(refused(&buffer(SHUFFLED | 1 << 5, 3, 7, 7, &stream(b"\xf0ad")), 7).contains("LZ4"));
         assert!(refused(&packed, 8).contains("holds 7 bytes, 8 are needed"));
         assert!(refused(&packed[..20], 7).contains("of 20 bytes says"));
         assert!(refused(&buffer(4 << 5, 3, 7, 7, &stream(&literals)), 7).contains("Zstandard"));
