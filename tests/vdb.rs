@@ -189,7 +189,7 @@ fn files_that_are_wrong_are_refused_with_byte_and_cause() {
     for (bytes, expected) in [
         (changed(&open, 8, &[221]), "byte 8: format version 221; 222 to 224"),
         (changed(&open, 20, &[0]), "byte 20: it was written to a stream"),
-        (open[..open.len() / 4].to_vec(), "the end is in the way"),
+        (open[..open.len() / 4].to_vec(), "bytes are needed here, but it ends at byte"),
     ] {
         let why = refused("a.vdb", &bytes, None);
         assert!(why.contains(expected), "{expected}\n{why}");

@@ -20,7 +20,7 @@ impl<'a> Bytes<'a> {
 
     /// What was unpacked from a file.
     pub fn unpacked(data: &'a [u8], name: &str) -> Self {
-        Bytes { data, first: 0, of: format!(" of the unpacked grid \"{name}\"") }
+        Bytes { data, first: 0, of: format!(" of the unpacked grid {name:?}") }
     }
 
     /// Some of the bytes, whose offsets begin with 0 again; messages still count from where these begin.
@@ -47,7 +47,10 @@ impl<'a> Bytes<'a> {
     /// So many bytes.
     pub fn slice(&self, at: usize, count: usize) -> Result<&'a [u8], String> {
         let end = at.checked_add(count).filter(|end| *end <= self.len());
-        let end = end.ok_or_else(|| self.error(at, format!("{count} bytes are needed; the end is in the way")))?;
+        let end = end.ok_or_else(|| {
+            let last = self.first as u64 + self.len() as u64;
+            self.error(at, format!("{count} bytes are needed here, but it ends at byte {last}"))
+        })?;
         Ok(&self.data[at..end])
     }
 

@@ -29,7 +29,7 @@ pub(super) fn read_nano(data: &[u8], name: Option<&str>) -> Result<(Grid, DMat4)
     let entries = nano::list(&bytes)?;
     let names: Vec<&str> = entries.iter().map(|entry| entry.name.as_str()).collect();
     let entry = &entries[choose(&names, name)?];
-    let about = |cause| format!("grid \"{}\": {cause}", entry.name);
+    let about = |cause| format!("grid {:?}: {cause}", entry.name);
     nano::read(&bytes, entry).and_then(Sparse::dense).map_err(about)
 }
 
@@ -39,19 +39,19 @@ pub(super) fn read_open(data: &[u8], name: Option<&str>) -> Result<(Grid, DMat4)
     let entries = open::list(&bytes)?;
     let names: Vec<&str> = entries.iter().map(|entry| entry.name.as_str()).collect();
     let index = choose(&names, name)?;
-    let about = |cause| format!("grid \"{}\": {cause}", names[index]);
+    let about = |cause| format!("grid {:?}: {cause}", names[index]);
     open::read(&bytes, &entries, index).and_then(Sparse::dense).map_err(about)
 }
 
 /// Which of the grids is meant.
 fn choose(names: &[&str], wanted: Option<&str>) -> Result<usize, String> {
-    let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+    let quoted: Vec<String> = names.iter().map(|name| format!("{name:?}")).collect();
     let list = quoted.join(", ");
     let found: Vec<usize> = (0..names.len()).filter(|k| names[*k] == wanted.unwrap_or("density")).collect();
     match (wanted, &found[..]) {
         _ if names.is_empty() => Err("it has no grids".to_owned()),
         (_, [one]) => Ok(*one),
-        (Some(wanted), []) => Err(format!("it has no grid \"{wanted}\"; its grids: {list}")),
+        (Some(wanted), []) => Err(format!("it has no grid {wanted:?}; its grids: {list}")),
         (Some(wanted), _) => {
             Err(format!("it has {} grids called \"{wanted}\", of which one cannot be told", found.len()))
         }

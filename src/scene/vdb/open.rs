@@ -61,7 +61,7 @@ pub(super) fn list(bytes: &Bytes) -> Result<Vec<Entry>, String> {
         let at = bytes.size(file.at)?;
         let end = bytes.size(file.at + 16)?;
         if end < file.at + 24 || at < file.at + 24 {
-            return Err(file.error(format!("the grid \"{name}\" is before its own head")));
+            return Err(file.error(format!("the grid {name:?} is before its own head")));
         }
         entries.push(Entry { name, unique, kind, parent, at });
         file.at = end;
@@ -91,7 +91,7 @@ pub(super) fn read(bytes: &Bytes, entries: &[Entry], index: usize) -> Result<Spa
         // A grid that shares its tree has its own transform, and nothing after it.
         let parent = entries.iter().find(|other| other.unique == entry.parent && other.parent.is_empty());
         let parent = parent.ok_or_else(|| {
-            bytes.error(entry.at, format!("it shares the voxels of \"{}\", which is not there", entry.parent))
+            bytes.error(entry.at, format!("it shares the voxels of {:?}, which is not there", entry.parent))
         })?;
         (file, compression, _) = head(bytes, parent)?;
     }
