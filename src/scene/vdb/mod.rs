@@ -146,6 +146,29 @@ impl Sparse {
             return Err("it has no active voxels".to_owned());
         }
         let size = [0, 1, 2].map(|k| (range.last[k] - range.first[k] + 1) as u64);
+        let count = self.room(size)?;
+        let first = DVec3::from_array(range.first.map(|k| k as f64)) - 0.5;
+        let cube = DMat4::from_translation(first) * DMat4::from_scale(DVec3::from_array(size.map(|side| side as f64)));
+        let to_world = self.to_world * cube;
+        let determinant = to_world.determinant();
+        if !to_world.is_finite() || !determinant.is_finite() || determinant.abs() < f64::MIN_POSITIVE {
+            return Err(format!("its transform has no inverse: {}", self.to_world));
+        }
+        let mut values: Vec<f32> = Vec::new();
+        if values.try_reserve_exact(count).is_err() {
+            let [x, y, z] = size;
+            return Err(format!("there is no memory for its {x} x {y} x {z} voxels of {} channels", self.channels));
+        }
+        let background = &self.background[..self.channels];
+        for _ in 0..count / self.channels {
+            values.extend_from_slice(background);
+        }
+        self.fill(range, size, &mut values);
+        Ok((Grid::new(size.map(|side| side as usize), self.channels, values)?, to_world))
+    }
+
+    /// How many numbers a box of so many voxels has; an error if that is more than can be, or than is worth it.
+    fn room(&self, size: [u64; 3]) -> Result<usize, String> {
         let [x, y, z] = size;
         let count = x.checked_mul(y).and_then(|n| n.checked_mul(z)).and_then(|n| n.checked_mul(self.channels as u64));
         let fits = size.iter().all(|side| *side <= MAX_SIDE as u64);
@@ -166,23 +189,7 @@ impl Sparse {
                 count as f64 * 4.0 / f64::from(1 << 30)
             ));
         }
-        let mut values: Vec<f32> = Vec::new();
-        if values.try_reserve_exact(count as usize).is_err() {
-            return Err(format!("there is no memory for its {x} x {y} x {z} voxels of {} channels", self.channels));
-        }
-        let background = &self.background[..self.channels];
-        for _ in 0..count / self.channels as u64 {
-            values.extend_from_slice(background);
-        }
-        self.fill(range, size, &mut values);
-        let first = DVec3::from_array(range.first.map(|k| k as f64)) - 0.5;
-        let cube = DMat4::from_translation(first) * DMat4::from_scale(DVec3::from_array(size.map(|side| side as f64)));
-        let to_world = self.to_world * cube;
-        let determinant = to_world.determinant();
-        if !to_world.is_finite() || !determinant.is_finite() || determinant.abs() < f64::MIN_POSITIVE {
-            return Err(format!("its transform has no inverse: {}", self.to_world));
-        }
-        Ok((Grid::new(size.map(|side| side as usize), self.channels, values)?, to_world))
+        Ok(count as usize)
     }
 
     /// How many voxels are active.
