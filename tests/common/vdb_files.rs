@@ -1,4 +1,4 @@
-//! The files of `tests/data/vdb`, which OpenVDB 10.0.1 and its `nanovdb_convert` wrote; they are here packed by gzip.
+//! The files of `tests/data/vdb`, which OpenVDB 10.0.1 and its `nanovdb_convert` wrote (`make.py` there), packed by gzip.
 
 use std::io::Read;
 use std::path::Path;
