@@ -154,6 +154,12 @@ fn segments_and_bare_grids() {
     bare[..8].copy_from_slice(b"NanoVDB1");
     let file = read("bare.nvdb", &bare, None).unwrap();
     compare(&file, FIRST, 0.0, density).unwrap();
+    // Newer files begin with other letters than their grids; the layout is that of all versions 32.
+    let mut newer = one;
+    newer[..8].copy_from_slice(b"NanoVDB2");
+    newer[head..head + 8].copy_from_slice(b"NanoVDB1");
+    [8, head + 16].iter().for_each(|at| newer[*at..at + 4].copy_from_slice(&(32u32 << 21 | 9 << 10).to_le_bytes()));
+    compare(&read("newer.nvdb", &newer, None).unwrap(), FIRST, 0.0, density).unwrap();
 }
 
 #[test]

@@ -181,6 +181,18 @@ fn unblosc(packed: &Bytes, entry: &Entry) -> Result<Vec<u8>, String> {
     Ok(unpacked)
 }
 
+/// From indices to world space.
+fn transform(bytes: &Bytes) -> Result<DMat4, String> {
+    // The map begins at byte 296, with the same in single precision; then come a matrix in rows, its inverse, and a shift.
+    let number = |k: usize| bytes.f64(296 + 88 + 8 * k);
+    let mut rows = [0.0; 9];
+    for (k, entry) in rows.iter_mut().enumerate() {
+        *entry = number(k)?;
+    }
+    let shift = DVec3::new(number(18)?, number(19)?, number(20)?);
+    Ok(DMat4::from_translation(shift) * DMat4::from_mat3(DMat3::from_cols_array(&rows).transpose()))
+}
+
 /// What a leaf holds.
 #[derive(Clone, Copy, PartialEq)]
 enum Values {
@@ -209,6 +221,7 @@ struct Tree<'a> {
 }
 
 impl<'a> Tree<'a> {
+    /// Reads a whole grid: what it is, where it is, how its nodes are laid out (`pnanovdb_grid_type_constants`), and the nodes.
     fn read(bytes: Bytes<'a>) -> Result<Sparse, String> {
         if !is_nano(bytes.slice(0, 8)?) {
             return Err(bytes.error(0, "no grid of NanoVDB begins here"));
@@ -230,15 +243,7 @@ impl<'a> Tree<'a> {
                 return Err(bytes.error(636, text));
             }
         };
-        let number = |k: usize| bytes.f64(296 + 88 + 8 * k);
-        let mut rows = [0.0; 9];
-        for (k, entry) in rows.iter_mut().enumerate() {
-            *entry = number(k)?;
-        }
-        // After the matrix, which is in rows, comes its inverse.
-        let shift = DVec3::new(number(18)?, number(19)?, number(20)?);
-        let to_world = DMat4::from_translation(shift) * DMat4::from_mat3(DMat3::from_cols_array(&rows).transpose());
-
+        let to_world = transform(&bytes)?;
         let vector = values == Values::Float(3);
         let (upper, lower) = if vector { (532_544, 66_624) } else { (270_400, 33_856) };
         let leaf = match values {
