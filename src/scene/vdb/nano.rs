@@ -292,15 +292,15 @@ impl<'a> Tree<'a> {
         let count = self.bytes.u32(root + 24)? as usize;
         // Three values and two statistics follow the background, up to a multiple of 32 bytes.
         let first = root + if self.channels == 3 { 96 } else { 64 };
-        let mut keys = HashSet::new();
+        let mut places = HashSet::new();
         for index in 0..count {
             let tile = first + 32 * index;
             let key = self.bytes.u64(tile)?;
-            if !keys.insert(key) {
-                return Err(self.bytes.error(tile, "two of the root's children are at the same place"));
-            }
             // 20 bits of each coordinate, that of x first.
             let origin = [42, 21, 0].map(|shift| ((key >> shift) as u32) << 12).map(|k| k as i32);
+            if !places.insert(origin) {
+                return Err(self.bytes.error(tile, "two of the root's children are at the same place"));
+            }
             match self.bytes.i64(tile + 8)? {
                 0 => {
                     let (value, active) = (self.value(tile + 20)?, self.bytes.u32(tile + 16)? != 0);
