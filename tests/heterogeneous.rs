@@ -6,6 +6,7 @@ use common::fields::{self, field, grid, uneven, unit_to};
 use common::images;
 use common::scenes::{self, v};
 use common::statistics::mean_and_error;
+use common::vdb_files;
 use glam::{DMat4, DVec3};
 use tyndall::gpu::Renderer;
 use tyndall::gpu::shader::Variant;
@@ -175,4 +176,35 @@ fn voxels_beyond_the_binding_range() {
     let refused =
         Renderer::with_variant(device, &large, &variant(false)).err().expect("it cannot be bound").to_string();
     assert!(refused.contains("values take") && refused.contains("can bind"), "{refused}");
+}
+
+/// Voxels of a `.vdb` and a `.nvdb` that are all ½, turned and moved by the file: a homogeneous medium in that box.
+#[test]
+fn constant_voxels_of_a_file_are_a_homogeneous_medium() {
+    let [file, other] = ["constant.nvdb", "constant.vdb"]
+        .map(|name| vdb_files::read(name, &vdb_files::data(name), None).unwrap_or_else(|why| panic!("{name}: {why}")));
+    assert!(file.grid == other.grid && file.to_world.abs_diff_eq(other.to_world, 1e-15), "{file:?} {other:?}");
+    // 6 x 5 x 4 voxels of a fifth of a unit, the first of which has its centre at (-0.25, -0.75, -0.5); turned by the angle of (4, 3, 5).
+    let turned = DMat4::from_translation(v(-0.25, -0.75, -0.5)) * DMat4::from_rotation_z(0.6f64.asin());
+    let place = turned * unit_to(v(-0.1, -0.1, -0.1), v(1.1, 0.9, 0.7));
+    let mut scene = scenes::gray_box();
+    scene.film = Film::new(16, 16);
+    scene.lights.push(Light::Point { position: v(-0.7, 0.5, 0.6), intensity: v(1.0, 1.5, 2.0) });
+    let ball = scene.shapes.iter().position(|shape| shape.boundary.is_some()).expect("a medium");
+    scene.media[0] = scenes::gray(4.0, 0.5, 0.4);
+    scene.shapes[ball] = fields::box_of("box", place, tyndall::scene::MediumId(0));
+    let mut voxels = scene.clone();
+    // The shape is larger than the voxels, which end where the file says.
+    let larger = place * unit_to(v(-0.1, -0.1, -0.1), v(1.1, 1.1, 1.1));
+    voxels.shapes[ball] = fields::box_of("box", larger, tyndall::scene::MediumId(0));
+    voxels.media[0].sigma_t = DVec3::splat(8.0);
+    let with = |to_world: DMat4| {
+        let mut scene = voxels.clone();
+        scene.media[0].volumes.sigma_t = Some(Volume::Grid(field(file.grid.clone(), to_world)));
+        scene
+    };
+    assert!(apart(&scene, &with(file.to_world), 256).abs() < 4.0);
+    assert!(apart(&scene, &with(DMat4::IDENTITY), 256).abs() > 4.0, "voxels in the unit cube pass");
+    let beyond = file.to_world * unit_to(v(-0.1, -0.1, -0.1), v(1.1, 1.1, 1.1));
+    assert!(apart(&scene, &with(beyond), 256).abs() > 4.0, "voxels a tenth larger on all sides pass");
 }

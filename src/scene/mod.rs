@@ -30,7 +30,9 @@ mod output;
 mod phase;
 pub mod spectrum;
 mod texture;
+mod vdb;
 pub mod volume;
+mod volume_formats;
 
 pub use bitmap::Bitmap;
 pub use bsdf::{Bsdf, Distribution, Relief, ReliefMap, Roughness};
@@ -40,6 +42,7 @@ pub use output::{Aov, AovKind, Colors, PixelFormat};
 pub use phase::Phase;
 pub use texture::{Filter, Texture, Wrap};
 pub use volume::{Grid, GridVolume, HeightVolume, Volume, Volumes};
+pub use volume_formats::GridFile;
 
 /// Index of a medium in [`Scene::media`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -1,7 +1,6 @@
-//! Fields in space: grids of voxels, read from Mitsuba's `.vol` files, and fog that thins out with height.
+//! Fields in space: grids of voxels, those of Mitsuba's `.vol` files among them, and fog that thins out with height.
 
 use std::fmt;
-use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
@@ -128,15 +127,9 @@ impl Grid {
         }
     }
 
-    /// Reads a file of Mitsuba's binary format, version 3 with 32-bit numbers (its manual, plugin `gridvolume`): the letters `VOL`, a
+    /// Decodes a file of Mitsuba's binary format, version 3 with 32-bit numbers (its manual, plugin `gridvolume`): the letters `VOL`, a
     /// byte 3, then as little-endian words the type 1, the voxels along x, y and z, the channels, six numbers of the bounding box,
     /// and the voxels. Also returns the box, lower and upper corner. The error says what is wrong with the file.
-    pub fn read(path: &Path) -> Result<(Grid, [DVec3; 2]), String> {
-        let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
-        Grid::decode(&bytes)
-    }
-
-    /// The same from the bytes of such a file.
     pub fn decode(bytes: &[u8]) -> Result<(Grid, [DVec3; 2]), String> {
         const HEAD: usize = 48;
         if !bytes.starts_with(b"VOL") {

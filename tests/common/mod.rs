@@ -14,6 +14,7 @@ pub mod tolerances;
 pub mod trial;
 pub mod truth;
 pub mod units;
+pub mod vdb_files;
 
 use std::sync::{Arc, OnceLock};
 use tyndall::gpu::{Device, DeviceChoice};

@@ -1,5 +1,7 @@
 //! Media whose coefficients depend on the place: what is read, and what is refused.
 
+use std::io::Read;
+
 use glam::{DMat4, DVec3};
 use tyndall::pack::Packed;
 use tyndall::scene::*;
@@ -64,6 +66,37 @@ fn grids() {
     assert_eq!(field.to_world.transform_point3(DVec3::ONE), DVec3::new(6.0, 4.0, 10.0));
 }
 
+/// The voxels of a `.nvdb` are where the file has them, and `to_world` comes after that.
+#[test]
+fn grids_of_other_formats() {
+    let packed = std::fs::read(crate::data("../vdb/fog.nvdb.gz")).unwrap();
+    let mut bytes = Vec::new();
+    flate2::read::GzDecoder::new(&*packed).read_to_end(&mut bytes).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fog.nvdb");
+    std::fs::write(&path, bytes).unwrap();
+    let volume = |name: &str, inside: &str| {
+        let file = path.display();
+        format!(r#"<volume type="gridvolume" name="{name}"><string name="filename" value="{file}"/>{inside}</volume>"#)
+    };
+    let named = r#"<string name="grid" value="heat"/>"#;
+    let scaled = r#"<transform name="to_world"><scale value="2"/></transform>"#;
+    let read = medium(&(volume("sigma_t", scaled) + &volume("emission", named)));
+    let (density, heat) = (voxels(&read.volumes.sigma_t), read.volumes.emission.as_ref().unwrap());
+    assert_eq!((density.grid.resolution(), heat.grid.resolution()), ([27, 8, 17], [3, 2, 4]));
+    // The first voxel, (-3, 0, -9), has its centre at (0.25, 2, 0.75); half a voxel is 1/8.
+    let first = density.to_world.transform_point3(DVec3::ZERO);
+    assert!((first - 2.0 * DVec3::new(0.125, 1.875, 0.625)).length() < 1e-12, "{first}");
+    assert_eq!(heat.to_world.transform_point3(DVec3::ZERO), DVec3::new(0.25, -0.5, -1.0));
+    let unit = r#"<boolean name="use_grid_bbox" value="false"/>"#;
+    let read = medium(&volume("sigma_t", &(unit.to_owned() + scaled)));
+    assert_eq!(voxels(&read.volumes.sigma_t).to_world, DMat4::from_scale(DVec3::splat(2.0)));
+    let text = cube(&volume("sigma_t", r#"<string name="grid" value="fire"/>"#));
+    let text = format!("<scene version=\"3.0.0\">{}{}{text}</scene>", crate::SENSOR, crate::LIGHT);
+    let error = parse(&text).unwrap_err().to_string();
+    assert!(error.contains("fog.nvdb: it has no grid \"fire\"; its grids: \"density\", \"heat\""), "{error}");
+}
+
 #[test]
 fn fog_over_everything() {
     let text = r#"<volume type="heightvolume" name="sigma_t"><rgb name="value" value="1 2 4"/><vector name="up" value="0 0 2"/>
@@ -110,6 +143,7 @@ fn what_is_wrong_is_refused() {
             "voxel (1, 0, 0) is -2; voxels must be finite and not negative",
         ),
         (volume("gridvolume", r#"<string name="filename" value="textures/sky.exr"/>"#), "letters \"VOL\""),
+        (grid("sigma_t", r#"<string name="grid" value="density"/>"#), "only .nvdb and .vdb files have names"),
         (grid("sigma_t", r#"<string name="filter_type" value="cubic"/>"#), "accepted: trilinear, nearest"),
         (grid("sigma_t", r#"<string name="wrap_mode" value="black"/>"#), "accepted: clamp, repeat, mirror"),
         (grid("sigma_t", r#"<transform name="to_world"><scale x="0"/></transform>"#), "no inverse"),

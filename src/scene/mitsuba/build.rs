@@ -10,9 +10,8 @@ use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
 use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture};
 use crate::scene::mesh::{self, FileMesh};
 use crate::scene::{
-    Aov, Bitmap, Geometry, Grid, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape, Volume,
+    Aov, Bitmap, Geometry, GridFile, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape, Volume,
 };
-use glam::DVec3;
 
 /// What the converters of single objects share.
 pub(super) struct Context<'a> {
@@ -23,8 +22,8 @@ pub(super) struct Context<'a> {
     pub aovs: Vec<Aov>,
     /// Images by file, and whether they are raw.
     pub images: HashMap<(PathBuf, bool), Arc<Bitmap>>,
-    /// Voxels by file, and the box that the file has for them.
-    pub grids: HashMap<PathBuf, (Arc<Grid>, [DVec3; 2])>,
+    /// Voxels by file and name of the grid in it.
+    pub grids: HashMap<(PathBuf, Option<String>), GridFile>,
     /// Meshes as they are in their files.
     pub meshes: HashMap<MeshKey, Arc<FileMesh>>,
     medium_ids: HashMap<ObjectId, MediumId>,

@@ -1,14 +1,12 @@
 //! `<volume>`: coefficients of a medium that depend on the place.
 
-use std::sync::Arc;
-
 use glam::{DMat4, DVec3};
 
 use super::build::Context;
 use super::props::{Child, Given, VolumeOrColor, unknown_plugin};
 use super::source;
 use super::texture::choice;
-use crate::scene::{Filter, Grid, GridVolume, HeightVolume, SceneError, Volume, Wrap};
+use crate::scene::{Filter, GridFile, GridVolume, HeightVolume, SceneError, Volume, Wrap};
 
 pub(super) const TYPES: [&str; 3] = ["constvolume", "gridvolume", "heightvolume"];
 
@@ -61,20 +59,22 @@ fn grid<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<GridVolume, S
     let wraps = [("clamp", Wrap::Clamp), ("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror)];
     let wrap = choice(&props, "wrap_mode", &wraps)?;
     let to_world = props.transform("to_world")?;
-    let own_box = props.boolean("use_grid_bbox")?.is_some_and(|given| given.value);
+    let own_box = props.boolean("use_grid_bbox")?.map(|given| given.value);
+    let name = props.string("grid")?;
     // How Mitsuba's spectral variants upsample colours, and whether a GPU's texture units look voxels up.
     props.ignore_boolean("raw")?;
     props.ignore_boolean("accel")?;
     props.finish()?;
 
     let path = source::find(&filename.value, child.object.folders.iter());
-    let (grid, [low, high]) = match context.grids.get(&path) {
+    let key = (path, name.map(|given| given.value));
+    let file = match context.grids.get(&key) {
         Some(known) => known.clone(),
         None => {
-            let (grid, bounds) = Grid::read(&path)
+            let (path, name) = (&key.0, key.1.as_deref());
+            let read = GridFile::read(path, name)
                 .map_err(|cause| filename.at.error(format!("cannot read the volume {}: {cause}", path.display())))?;
-            let read = (Arc::new(grid), bounds);
-            context.grids.insert(path, read.clone());
+            context.grids.insert(key, read.clone());
             read
         }
     };
@@ -85,8 +85,8 @@ fn grid<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<GridVolume, S
         Some(given) => given.value,
         None => DMat4::IDENTITY,
     };
-    let cube = if own_box { DMat4::from_translation(low) * DMat4::from_scale(high - low) } else { DMat4::IDENTITY };
-    Ok(GridVolume { grid, to_world: placed * cube, filter, wrap })
+    let cube = if own_box.unwrap_or(file.places_itself) { file.to_world } else { DMat4::IDENTITY };
+    Ok(GridVolume { grid: file.grid, to_world: placed * cube, filter, wrap })
 }
 
 /// Fog that thins out with height.
