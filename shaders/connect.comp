@@ -14,7 +14,7 @@ shared uint next_sample;
 
 void main() {
     if (gl_LocalInvocationIndex == 0u) {
-        next_sample = 0u;
+        next_sample = WORKGROUP;
     }
     barrier();
     uint count = push.work.sample_count, samples_in_tile = TILE * TILE * count;
@@ -22,7 +22,7 @@ void main() {
     uvec2 size = uvec2(params.crop_width, params.crop_height);
     uvec2 corner = tile_pixel(push.work.first_tile + gl_WorkGroupID.x, 0u, params.crop_width);
     // The sample whose first vertex is connected, and the number of the next pixel of its group.
-    uint slot = 0u, next = SHARERS, own = 0u, pairs = 0u, to = 0u;
+    uint slot = gl_LocalInvocationIndex, of_pixel = 0u, next = 0u, own = 0u, pairs = 0u, to = 0u;
     uvec2 pixel = uvec2(0u);
     End first, second;
     vec3 weight = vec3(0.0);
@@ -36,63 +36,56 @@ void main() {
     Walk walk = Walk(0u, 0u, 0u);
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {
-            if (asked) {
-                store_pair(pairs, own, to, end_connection(hit, second, weight, density));
+            vec4 found = asked ? end_connection(hit, second, weight, density) : vec4(0.0);
+            if (next > 0u) {
+                store_pair(pairs, own, to, found);
             }
-            asked = false;
-            [[dont_unroll]] while (!asked) {
-                if (next == SHARERS) {
+            // Without a tree all rays take the same time, and the invocations stay in step.
+            if (next == SHARERS) {
+                if (HAS_TREE) {
                     slot = atomicAdd(next_sample, 1u);
-                    if (slot >= samples_in_tile) {
-                        break;
-                    }
-                    uint in_tile = slot / count;
-                    uvec2 place = uvec2(in_tile % TILE, in_tile / TILE);
-                    pixel = corner + place;
-                    own = sharer_number(place);
-                    pairs = pairs_of(gl_WorkGroupID.x * (samples_in_tile / SHARERS) + group_in_tile(place) * count + slot % count);
-                    uint record = record_of(first_slot + slot);
-                    if (all(lessThan(pixel, size))) {
-                        first = load_end(record);
-                    } else {
-                        first.kind = END_NONE;
-                    }
-                    if (first.kind != END_NONE) {
-                        vec4 left = SAMPLE(record + 2u);
-                        path.left = uint(left.x) | uint(left.y) << 16u;
-                        if (HAS_CHROMATIC) {
-                            weight = SAMPLE(record + 3u).xyz;
-                        }
-                    }
-                    next = 0u;
+                } else {
+                    slot += WORKGROUP;
                 }
-                to = next;
-                next += 1u;
-                uvec2 other = sharer_pixel(pixel, to);
-                if (first.kind != END_NONE && all(lessThan(other, size))) {
-                    uvec2 place = other - corner;
-                    uint record = record_of(first_slot + (place.y * TILE + place.x) * count + slot % count);
-                    second = load_end(record + SECOND);
-                    if (second.kind != END_NONE) {
-                        asked = begin_connection(path, first, second, density);
-                        if (asked && to == own && !HAS_CHROMATIC) {
-                            // The path has been there.
-                            hit.blocked = false;
-                            hit.tau = SAMPLE(record + BASE).w;
-                            store_pair(pairs, own, to, end_connection(hit, second, weight, density));
-                            asked = false;
-                            continue;
-                        }
-                    }
-                }
-                if (!asked) {
-                    store_pair(pairs, own, to, vec4(0.0));
-                }
+                next = 0u;
             }
-            if (!asked) {
+            if (slot >= samples_in_tile) {
                 break;
             }
-            begin_ray(path, ray, grid, walk, hit);
+            if (next == 0u) {
+                uint in_tile = quotient(slot, count), record = record_of(first_slot + slot);
+                uvec2 place = uvec2(in_tile % TILE, in_tile / TILE);
+                of_pixel = slot - in_tile * count;
+                pixel = corner + place;
+                own = sharer_number(place);
+                pairs = pairs_of(gl_WorkGroupID.x * (samples_in_tile / SHARERS) + group_in_tile(place) * count + of_pixel);
+                first = load_end(record);
+                first.kind = all(lessThan(pixel, size)) ? first.kind : END_NONE;
+                vec4 left = SAMPLE(record + 2u);
+                path.left = uint(left.x) | uint(left.y) << 16u;
+                if (HAS_CHROMATIC) {
+                    weight = SAMPLE(record + 3u).xyz;
+                }
+            }
+            to = next;
+            next += 1u;
+            asked = false;
+            uvec2 other = sharer_pixel(pixel, to);
+            if (first.kind != END_NONE && all(lessThan(other, size))) {
+                uvec2 place = other - corner;
+                uint record = record_of(first_slot + (place.y * TILE + place.x) * count + of_pixel);
+                second = load_end(record + SECOND);
+                asked = second.kind != END_NONE && begin_connection(path, first, second, density);
+                if (asked) {
+                    begin_ray(path, ray, grid, walk, hit);
+                }
+                if (!HAS_CHROMATIC && to == own) {
+                    // The path has been there.
+                    walk = Walk(0u, 0u, 0u);
+                    hit.blocked = false;
+                    hit.tau = SAMPLE(record + BASE).w;
+                }
+            }
         }
     }
 }

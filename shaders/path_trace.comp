@@ -23,7 +23,8 @@ void main() {
     // Neighbouring tiles cost alike: a step coprime to their number spreads them over the processors.
     uint turn = (gl_WorkGroupID.x * push.work.tile_step) % push.work.tile_count;
     uint tile = push.work.first_tile + turn;
-    uint samples_in_tile = TILE * TILE * push.work.sample_count;
+    uvec2 corner = tile_pixel(tile, 0u, params.crop_width);
+    uint count = push.work.sample_count, samples_in_tile = TILE * TILE * count;
     uint slot = gl_LocalInvocationIndex;
 
     Path path;
@@ -46,27 +47,27 @@ void main() {
                         share_part(path, 3u, path.shared_direction);
                         radiance = vec3(0.0);
                     }
-                    SAMPLE(turn * samples_in_tile + slot) = HAS_FILTER ? vec4(radiance * path.filter_weight, path.filter_weight) : vec4(radiance, 0.0);
+                    store_sample(turn * samples_in_tile + slot, HAS_FILTER ? vec4(radiance * path.filter_weight, path.filter_weight) : vec4(radiance, 0.0));
                     slot = atomicAdd(next_sample, 1u);
                 }
                 fresh = false;
                 // Pixels beyond the crop window's edge have no samples.
-                uvec2 pixel = tile_pixel(tile, slot / push.work.sample_count, params.crop_width);
+                uint in_tile = quotient(slot, count);
+                uvec2 pixel = corner + uvec2(in_tile % TILE, in_tile / TILE);
                 while (slot < samples_in_tile && (pixel.x >= params.crop_width || pixel.y >= params.crop_height)) {
                     slot = atomicAdd(next_sample, 1u);
-                    pixel = tile_pixel(tile, slot / push.work.sample_count, params.crop_width);
+                    in_tile = quotient(slot, count);
+                    pixel = corner + uvec2(in_tile % TILE, in_tile / TILE);
                 }
                 if (slot >= samples_in_tile) {
                     break;
                 }
-                path.pixel = (pixel.y + params.crop_y) * params.film_width + pixel.x + params.crop_x;
-                path.sample_index = push.work.first_sample + slot % push.work.sample_count;
+                path.sample_index = push.work.first_sample + slot - in_tile * count;
                 if (HAS_SHARING) {
                     path.slot = turn * samples_in_tile + slot;
-                    SAMPLE(record_of(path.slot)) = vec4(0.0);
-                    SAMPLE(record_of(path.slot) + SECOND) = vec4(0.0);
+                    share_nothing(path.slot);
                 }
-                path_start(path);
+                path_start(path, pixel);
             }
             begin_ray(path, ray, grid, walk, hit);
         }

@@ -17,7 +17,8 @@ void main() {
     if (number >= push.work.tile_count * groups_in_tile * count) {
         return;
     }
-    uint turn = number / (groups_in_tile * count), group = number / count % groups_in_tile;
+    uint turn = number / (groups_in_tile * count), in_turn = number - turn * groups_in_tile * count;
+    uint group = quotient(in_turn, count), of_pixel = in_turn - group * count;
     uvec2 corner = tile_pixel(push.work.first_tile + turn, 0u, params.crop_width), place = group_pixel(group);
     uvec2 size = uvec2(params.crop_width, params.crop_height);
     uint pairs = pairs_of(number);
@@ -27,7 +28,7 @@ void main() {
     vec3 points[SHARERS], sums[SHARERS];
     for (uint i = 0u; i < SHARERS; ++i) {
         uvec2 pixel = sharer_pixel(place, i);
-        slots[i] = (turn * TILE * TILE + pixel.y * TILE + pixel.x) * count + number % count;
+        slots[i] = (turn * TILE * TILE + pixel.y * TILE + pixel.x) * count + of_pixel;
         vec4 first = vec4(0.0);
         if (all(lessThan(corner + pixel, size))) {
             first = SAMPLE(record_of(slots[i]));
@@ -49,7 +50,7 @@ void main() {
         }
         if (of_place > 0.0) {
             uvec2 pixel = sharer_pixel(place, j);
-            uint record = record_of((turn * TILE * TILE + pixel.y * TILE + pixel.x) * count + number % count);
+            uint record = record_of((turn * TILE * TILE + pixel.y * TILE + pixel.x) * count + of_pixel);
             Sent sent = load_sent(record);
             if (HAS_HENYEY_GREENSTEIN) {
                 End second = load_end(record + SECOND);

@@ -33,10 +33,10 @@ const FEW_PATHS_PER_BLOCK: u32 = 4;
 const OWN_STRATIFIED: f64 = 4.0;
 /// A group of M pixels has the variance of M to this power paths of one's own (measured: .65 to .76).
 const ALIKE_EXPONENT: f64 = 0.7;
-/// What keeping paths and summing up costs, in units of a path (measured: .3).
-const SHARE_COST: f64 = 0.3;
-/// A connection's ray takes this share of the time of a path's own ray, where they go through a tree (measured: .55 to .7).
-const CONNECTION_COST: f64 = 0.6;
+/// What keeping paths and summing up costs, in units of a path (measured: .25 to .35).
+const SHARE_COST: f64 = 0.35;
+/// A connection's ray takes this share of the time of a path's own ray, which has more to decide (measured: .4 to .5).
+const CONNECTION_COST: f64 = 0.45;
 
 /// Films with fewer pixels are rendered before a pilot would be.
 const LEAST_PIXELS: usize = 4096;
@@ -120,7 +120,7 @@ pub fn run(packed: &mut Packed, sharing: bool) {
     let side = params.crop_width.max(params.crop_height).div_ceil(MOST_BLOCKS);
     let blocks = Blocks { side, columns: params.crop_width.div_ceil(side), rows: params.crop_height.div_ceil(side) };
     let trails = follow(&tables, blocks, rounds);
-    let Some(view) = View::of(&trails, blocks, roulette) else { return };
+    let Some(view) = View::of(&trails, blocks) else { return };
     packed.features.sharers = if sharing { view.best_sharers() } else { 0 };
     if roulette && let Some(found) = Found::of(&trails, &view, packed.features.sharers) {
         found.add_to(packed, blocks);
@@ -217,7 +217,7 @@ struct View {
 
 impl View {
     /// Nothing, if the image is black or has no variance. Lamps that are seen directly do not count: the dark pixels beside them do.
-    fn of(trails: &[Trail], blocks: Blocks, tree: bool) -> Option<View> {
+    fn of(trails: &[Trail], blocks: Blocks) -> Option<View> {
         let finite = || trails.iter().filter(|trail| trail.radiance.is_finite());
         let count = finite().count() as f64;
         let mean = finite().map(|trail| trail.radiance).sum::<DVec3>() / count;
@@ -246,7 +246,7 @@ impl View {
         let own = variance(&|trail| trail.radiance - trail.shared);
         let rays = trails.iter().map(|trail| trail.rays).sum::<f64>() / trails.len() as f64;
         let known = floor > 0.0 && all > 0.0 && all.is_finite();
-        let connection = if tree { CONNECTION_COST } else { 1.0 } / rays;
+        let connection = CONNECTION_COST / rays;
         known.then_some(View { focus, variance: all, own, shared, rays, connection })
     }
 

@@ -96,7 +96,23 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("path_lights", &["path_state", "path_vertex", "path_aim", "light", "sky", "grid"]),
     ("path_flight", &["path_state", "path_aim", "equiangular", "ray", "light", "grid"]),
     ("path_rays", &["path_state", "path_surface", "path_flight", "ray"]),
-    ("path", &["path_state", "path_vertex", "path_lights", "path_rays", "path_flight", "camera", "filter", "outlook"]),
+    ("path_share", &["path_state", "path_vertex", "path_rays"]),
+    ("path_walk", &["path_rays", "bvh"]),
+    (
+        "path",
+        &[
+            "path_state",
+            "path_vertex",
+            "path_lights",
+            "path_rays",
+            "path_flight",
+            "path_share",
+            "camera",
+            "filter",
+            "film",
+            "outlook",
+        ],
+    ),
 ];
 const ALL_MAY_INCLUDE: &[&str] = &["constants", "layout", "features", "immediates", "sobol"];
 
@@ -150,7 +166,8 @@ fn every_concept_has_a_mirror_and_a_unit_kernel() {
         some.iter().for_each(|name| assert!(all.remove(*name), "{name} does not exist"));
         all
     };
-    let concepts = without(names("shaders/lib", ".glsl"), &["constants"]);
+    // How rays go in step decides nothing.
+    let concepts = without(names("shaders/lib", ".glsl"), &["constants", "path_walk"]);
     assert_eq!(without(names("src/reference", ".rs"), &["mod"]), concepts, "mirrors of concepts");
     // The path and its bindings are tested as a whole, by images.
     assert_eq!(
@@ -163,6 +180,7 @@ fn every_concept_has_a_mirror_and_a_unit_kernel() {
                 "path_flight",
                 "path_lights",
                 "path_rays",
+                "path_share",
                 "path_state",
                 "path_surface",
                 "path_vertex",

@@ -463,6 +463,24 @@ fn tiles_cover_the_crop_window_once() {
 }
 
 #[test]
+fn quotients_of_integers() {
+    let mut random = Random(61);
+    let mut pairs: Vec<[u32; 2]> = vec![[0, 1], [(1 << 22) - 1, 1], [(1 << 22) - 1, (1 << 22) - 1]];
+    for _ in 0..20_000 {
+        let (b, q) = (random.log_between(1.0, 4e6) as u32, random.unit());
+        // Multiples and their neighbours.
+        let multiple = (q * f64::from((1 << 22) / b)) as u32 * b;
+        pairs.extend([[multiple, b], [multiple.saturating_sub(1), b], [multiple + b - 1, b]]);
+    }
+    pairs.retain(|[a, _]| *a < 1 << 22);
+    let inputs: Vec<[u32; 4]> = pairs.iter().map(|[a, b]| [0, *a, 8, *b]).collect();
+    let outputs: Vec<[u32; 4]> = run("film", &inputs, &[], inputs.len(), inputs.len());
+    for ([a, b], output) in pairs.iter().zip(&outputs) {
+        assert_eq!(film::quotient(*a, *b), output[2], "{a} / {b}");
+    }
+}
+
+#[test]
 fn reconstruction_filters() {
     let (mut ranks, mut weights, mut densities) =
         (comparison("sample_filter rank"), comparison("sample_filter weight"), comparison("filter_pdf"));

@@ -56,6 +56,11 @@ Primitive load_primitive(uint i) {
 #define VALUE(i) push.values.at[i]
 #define GRID(i) push.grids.at[i]
 #define SAMPLE(i) push.samples.at[i]
+layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer SampleWordsAddress { u64vec2 at[]; };
+void store_sample(uint i, vec4 v) {
+    uvec4 bits = floatBitsToUint(v);
+    SampleWordsAddress(push.samples).at[i] = u64vec2(pack64(bits.xy), pack64(bits.zw));
+}
 #else
 layout(set = 0, binding = 0, std430) readonly buffer Nodes { uvec4 nodes[]; };
 layout(set = 0, binding = 1, std430) readonly buffer Primitives { Primitive primitives[]; };
@@ -85,5 +90,8 @@ layout(push_constant) uniform Push {
 #define VALUE(i) values[i]
 #define GRID(i) grids[i]
 #define SAMPLE(i) samples[i]
+void store_sample(uint i, vec4 v) {
+    samples[i] = v;
+}
 #endif
 layout(set = 0, binding = 12, std430) readonly buffer ParamsBuffer { Params params; };

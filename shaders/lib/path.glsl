@@ -20,6 +20,7 @@
 #include "lib/path_share.glsl"
 #include "lib/camera.glsl"
 #include "lib/filter.glsl"
+#include "lib/film.glsl"
 #include "lib/outlook.glsl"
 
 // Depth at which roulette begins to end paths that lose nothing, so that a closed scene without absorption ends. A path gets
@@ -43,9 +44,11 @@ vec2 filtered_place(inout Path path, vec2 center, vec2 u) {
     return center + vec2(x.offset, y.offset);
 }
 
-void path_start(inout Path path) {
+// Begins a path at a pixel of the crop window.
+void path_start(inout Path path, uvec2 pixel) {
+    uint row = pixel.y + params.crop_y, column = pixel.x + params.crop_x;
+    path.pixel = row * params.film_width + column;
     vec4 u = sample_set(path, 0u);
-    uint row = path.pixel / params.film_width, column = path.pixel - row * params.film_width;
     vec2 place = vec2(column, row) + u.xy;
     path.filter_weight = 1.0;
     if (HAS_FILTER && params.filter_cells > 0u) {
@@ -76,7 +79,7 @@ void path_start(inout Path path) {
     path.eta_scale = 1.0;
     path.foreseen = false;
     if (HAS_PILOT) {
-        uvec2 block = uvec2(column - params.crop_x, row - params.crop_y) / params.block_side;
+        uvec2 block = uvec2(quotient(pixel.x, params.block_side), quotient(pixel.y, params.block_side));
         uint first = params.first_block + 4u * (block.y * params.block_columns + block.x);
         path.focus = vec3(VALUE(first), VALUE(first + 1u), VALUE(first + 2u));
     }

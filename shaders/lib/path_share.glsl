@@ -72,7 +72,7 @@ uint pairs_of(uint number) {
 // The density of the second vertex of j by the first of i: of each channel, and as the flight of i chooses one.
 void store_pair(uint pairs, uint i, uint j, vec4 density) {
     if (HAS_CHROMATIC) {
-        SAMPLE(pairs + SHARERS * j + i) = density;
+        store_sample(pairs + SHARERS * j + i, density);
     } else {
         SAMPLE(pairs + SHARERS / 4u * j + i / 4u)[i % 4u] = density.w;
     }
@@ -93,8 +93,8 @@ uvec2 group_pixel(uint group) {
 
 void store_end(uint at, Path path, Vertex vertex) {
     uint kind = vertex.in_medium ? END_MEDIUM : END_SURFACE;
-    SAMPLE(at) = vec4(vertex.point, float(kind | path.medium << 2u));
-    SAMPLE(at + 1u) = vec4(vertex.axis, path.offset);
+    store_sample(at, vec4(vertex.point, float(kind | path.medium << 2u)));
+    store_sample(at + 1u, vec4(vertex.axis, path.offset));
 }
 
 End load_end(uint at) {
@@ -111,6 +111,12 @@ bool can_share(Path path, Vertex vertex) {
     return diffuse && plain && path.medium != NONE;
 }
 
+// A sample begins: none of its vertices is kept.
+void share_nothing(uint slot) {
+    SAMPLE(record_of(slot)).w = float(END_NONE);
+    SAMPLE(record_of(slot) + SECOND).w = float(END_NONE);
+}
+
 // Before the path scatters: keeps its first two vertices. From the second one on the path gathers radiance for a throughput of 1.
 void share_vertex(inout Path path, inout Vertex vertex) {
     uint record = record_of(path.slot);
@@ -118,13 +124,13 @@ void share_vertex(inout Path path, inout Vertex vertex) {
         vec3 weight = path.throughput * (vertex.in_medium ? vertex.albedo : vertex.surface.reflectance);
         if (max_component(weight) > 0.0) {
             store_end(record, path, vertex);
-            SAMPLE(record + 2u) = vec4(float(path.left & 0xffffu), float(path.left >> 16u), 0.0, 0.0);
-            SAMPLE(record + 3u) = vec4(weight, 0.0);
+            store_sample(record + 2u, vec4(float(path.left & 0xffffu), float(path.left >> 16u), 0.0, 0.0));
+            store_sample(record + 3u, vec4(weight, 0.0));
             path.sharing = 1u;
         }
     } else if (path.depth == 1u && path.sharing == 1u && can_share(path, vertex)) {
         store_end(record + SECOND, path, vertex);
-        SAMPLE(record + BASE) = vec4(path.radiance, HAS_MEDIA && !HAS_CHROMATIC ? path.tau : 0.0);
+        store_sample(record + BASE, vec4(path.radiance, HAS_MEDIA && !HAS_CHROMATIC ? path.tau : 0.0));
         path.radiance = vec3(0.0);
         path.before = vertex.in_medium ? path.throughput * vertex.albedo : path.throughput;
         path.throughput = vec3(1.0);
@@ -136,17 +142,19 @@ void share_vertex(inout Path path, inout Vertex vertex) {
 // Keeps what a path brings that ends at its second vertex, and clears what has not come yet.
 void share_ended(inout Path path) {
     uint at = record_of(path.slot) + SENT;
-    SAMPLE(at) = vec4(path.radiance, 0.0);
-    SAMPLE(at + 1u) = vec4(0.0);
-    SAMPLE(at + 2u) = vec4(0.0);
+    store_sample(at, vec4(path.radiance, 0.0));
+    store_sample(at + 1u, vec4(0.0));
+    store_sample(at + 2u, vec4(0.0));
     path.radiance = vec3(0.0);
 }
 
 // Keeps a part of what the second vertex sends, and begins the next.
 void share_part(inout Path path, uint part, vec3 direction) {
     uint at = record_of(path.slot) + SENT + part;
-    SAMPLE(at) = vec4(path.radiance, 0.0);
-    SAMPLE(at + 1u) = vec4(direction, 0.0);
+    store_sample(at, vec4(path.radiance, 0.0));
+    if (HAS_HENYEY_GREENSTEIN) {
+        store_sample(at + 1u, vec4(direction, 0.0));
+    }
     path.radiance = vec3(0.0);
 }
 

@@ -1,4 +1,4 @@
-// Unit kernel of lib/film.glsl: (tile, pixel, width of the crop window, 0) in; (column, row, 0, 0) out.
+// Unit kernel of lib/film.glsl: (tile, pixel, width of the crop window, divisor) in; (column, row, pixel / divisor, 0) out.
 #version 460
 #include "lib/layout.glsl"
 #include "lib/film.glsl"
@@ -10,6 +10,6 @@ layout(set = 0, binding = 1, std430) buffer Outputs { uvec4 outputs[]; };
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i < uint(inputs.length())) {
-        outputs[i] = uvec4(tile_pixel(inputs[i].x, inputs[i].y, inputs[i].z), 0u, 0u);
+        outputs[i] = uvec4(tile_pixel(inputs[i].x, inputs[i].y, inputs[i].z), quotient(inputs[i].y, inputs[i].w), 0u);
     }
 }

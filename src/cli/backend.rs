@@ -32,12 +32,6 @@ pub fn open(
     if with_pilot {
         pilot::run(&mut packed, sharing);
     }
-    if let Ok(n) = std::env::var("TYNDALL_SHARERS") {
-        packed.features.sharers = n.parse().expect("number");
-    }
-    if std::env::var_os("TYNDALL_SHOW").is_some() {
-        eprintln!("sharers {}", packed.features.sharers);
-    }
     packed.warnings.iter().for_each(|warning| warn(warning));
     if choice == "reference" {
         return Ok(Box::new(reference::Renderer::new(packed)));
