@@ -28,6 +28,8 @@ pub(super) struct Context<'a> {
     /// Meshes as they are in their files.
     pub meshes: HashMap<MeshKey, Arc<FileMesh>>,
     medium_ids: HashMap<ObjectId, MediumId>,
+    /// The `volumelight` by which a medium shines.
+    pub volume_lights: HashMap<MediumId, ObjectId>,
     /// BSDFs that are being read, each inside of the one before it.
     pub open_bsdfs: Vec<ObjectId>,
 }
@@ -64,6 +66,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
         grids,
         meshes,
         medium_ids,
+        volume_lights: HashMap::new(),
         open_bsdfs: Vec::new(),
     };
     let props = Props::new(tree, root);

@@ -11,7 +11,8 @@ use super::transform::rigid;
 use super::tree::Kind;
 use crate::scene::{Light, SceneError};
 
-pub(super) const TYPES: [&str; 6] = ["area", "point", "spot", "directional", "constant", "envmap"];
+pub(super) const TYPES: [&str; 7] =
+    ["area", "point", "spot", "directional", "constant", "envmap", "volumelight"];
 
 /// The radiance of an `area` emitter inside a shape.
 pub(super) fn area<'a>(context: &Context<'a>, child: Child<'a>) -> Result<DVec3, SceneError> {
@@ -72,6 +73,9 @@ pub(super) fn light<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<L
         "envmap" => envmap(context, child, &props)?,
         "area" => {
             return Err(child.at.error("<emitter type=\"area\"> must be inside the <shape> that is to shine"));
+        }
+        "volumelight" => {
+            return Err(child.at.error("<emitter type=\"volumelight\"> must be inside the <shape> whose medium is to shine"));
         }
         _ => return Err(unknown_plugin(child.object, &TYPES)),
     };

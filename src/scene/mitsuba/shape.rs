@@ -5,7 +5,7 @@ use glam::{DMat3, DMat4, DVec3};
 use super::build::Context;
 use super::props::{Child, Props, unknown_plugin};
 use super::tree::Kind;
-use super::{bsdf, emitter, mesh_file};
+use super::{bsdf, emitter, medium, mesh_file};
 use crate::scene::mesh;
 use crate::scene::{Boundary, Bsdf, Geometry, SceneError, Shape};
 
@@ -86,11 +86,21 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
         return Err(unknown_plugin(child.object, &TYPES));
     }
     let props = context.props(child);
+    let boundary = boundary(context, &props)?;
     let emission = match props.child(Kind::Emitter)? {
+        Some(emitter) if emitter.object.plugin == "volumelight" => {
+            let Some(medium) = boundary.and_then(|boundary| boundary.interior) else {
+                return Err(emitter.at.error(
+                    "<emitter type=\"volumelight\"> makes the medium inside of a shape shine; this one has no medium named \
+                     \"interior\"",
+                ));
+            };
+            medium::shine(context, medium, emitter)?;
+            None
+        }
         Some(emitter) => Some(emitter::area(context, emitter)?),
         None => None,
     };
-    let boundary = boundary(context, &props)?;
     let bsdf = match props.child(Kind::Bsdf)? {
         Some(child) => bsdf::convert(context, child)?,
         None => default_bsdf(context, child, emission, boundary),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3};
 
 use super::build::Context;
-use super::props::{Child, Given, VolumeOrColor, unknown_plugin};
+use super::props::{Child, Given, Props, VolumeOrColor, unknown_plugin};
 use super::source;
 use super::texture::choice;
 use crate::scene::{Filter, Grid, GridVolume, HeightVolume, SceneError, Volume, Wrap};
@@ -38,16 +38,40 @@ pub(super) fn coefficient<'a>(
             "constvolume" => {
                 let props = context.props(child);
                 let value = if name == "emission" { props.emission("value")? } else { props.color("value")? };
+                let placed = placed(&props)?;
                 props.finish()?;
-                match value {
-                    Some(given) => constant(given),
-                    None => Ok(Coefficient { factor: DVec3::ONE, field: None }),
+                let coefficient = value.map_or(Ok(Coefficient { factor: DVec3::ONE, field: None }), constant)?;
+                // Mitsuba's heterogeneous media end where the box of their sigma_t ends, be it that of a constant. Of the other
+                // coefficients only the value counts.
+                if name != "sigma_t" {
+                    return Ok(coefficient);
                 }
+                if placed.is_none() {
+                    context.warnings.push(child.object.at.warning(
+                        "the medium fills the unit cube [0, 1]³ alone, as in Mitsuba, since its sigma_t has no to_world to make \
+                         it larger",
+                    ));
+                }
+                let voxel = Grid::new([1; 3], 1, vec![1.0]).expect("one finite voxel is a grid");
+                let to_world = placed.unwrap_or(DMat4::IDENTITY);
+                let (filter, wrap) = (Filter::Nearest, Wrap::Clamp);
+                let field = GridVolume { grid: Arc::new(voxel), to_world, filter, wrap };
+                Ok(Coefficient { field: Some(Volume::Grid(field)), ..coefficient })
             }
             "gridvolume" => Ok(Coefficient { factor: DVec3::ONE, field: Some(Volume::Grid(grid(context, child)?)) }),
             "heightvolume" => height(context, child, name),
             _ => Err(unknown_plugin(child.object, &TYPES)),
         },
+    }
+}
+
+/// Where the unit cube is.
+fn placed(props: &Props) -> Result<Option<DMat4>, SceneError> {
+    match props.transform("to_world")? {
+        Some(Given { value, at }) if value.determinant().abs() < f64::MIN_POSITIVE => {
+            Err(at.error(format!("to_world has no inverse: {value}")))
+        }
+        given => Ok(given.map(|given| given.value)),
     }
 }
 
@@ -60,7 +84,7 @@ fn grid<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<GridVolume, S
     let filter = choice(&props, "filter_type", &[("trilinear", Filter::Bilinear), ("nearest", Filter::Nearest)])?;
     let wraps = [("clamp", Wrap::Clamp), ("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror)];
     let wrap = choice(&props, "wrap_mode", &wraps)?;
-    let to_world = props.transform("to_world")?;
+    let placed = placed(&props)?.unwrap_or(DMat4::IDENTITY);
     let own_box = props.boolean("use_grid_bbox")?.is_some_and(|given| given.value);
     // How Mitsuba's spectral variants upsample colours, and whether a GPU's texture units look voxels up.
     props.ignore_boolean("raw")?;
@@ -77,13 +101,6 @@ fn grid<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<GridVolume, S
             context.grids.insert(path, read.clone());
             read
         }
-    };
-    let placed = match to_world {
-        Some(Given { value, at }) if value.determinant().abs() < f64::MIN_POSITIVE => {
-            return Err(at.error(format!("to_world has no inverse: {value}")));
-        }
-        Some(given) => given.value,
-        None => DMat4::IDENTITY,
     };
     let cube = if own_box { DMat4::from_translation(low) * DMat4::from_scale(high - low) } else { DMat4::IDENTITY };
     Ok(GridVolume { grid, to_world: placed * cube, filter, wrap })
