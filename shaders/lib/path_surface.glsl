@@ -1,6 +1,7 @@
 // What a surface is at a point: texture coordinates, colours, opacity, and the frame of its BSDF.
 #include "lib/path_state.glsl"
 #include "lib/texture.glsl"
+#include "lib/bsdf.glsl"
 
 bool is_sphere(Primitive primitive) {
     return HAS_SPHERES && (primitive.surface & PRIMITIVE_SPHERE) != 0u;
@@ -18,8 +19,24 @@ vec2 texture_coordinates(Primitive primitive, uint index, vec3 point, vec2 baryc
     return vec2(dot(vec3(corners.u_a, corners.u_b, corners.u_c), weights), dot(corners.v, weights));
 }
 
-// Probability that light meets a mask.
-float opacity_at(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric) {
+// The normal of the BSDF's frame: that of the surface, or the interpolated one.
+vec3 shading_normal(uint index, vec2 barycentric, vec3 normal) {
+    Corners corners = CORNERS(index);
+    vec3 sum = corners.normal_a * (1.0 - barycentric.x - barycentric.y) + corners.normal_b * barycentric.x + corners.normal_c * barycentric.y;
+    float squared = dot(sum, sum);
+    return squared > 0.0 ? sum * inversesqrt(squared) : normal;
+}
+
+// Probability that light in a direction meets a surface that it may also pass: a mask, or a thin pane, of which `opacity` says how
+// much of the light is left that it does not reflect.
+float opacity_at(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric, vec3 direction) {
+    if (HAS_PANES && (surface.flags & SURFACE_PANE) != 0u) {
+        vec3 normal = is_sphere(primitive) ? normalize(point - primitive.a) : normalize(cross(primitive.b - primitive.a, primitive.c - primitive.a));
+        if (HAS_SHADING_NORMALS && (surface.flags & SURFACE_SMOOTH) != 0u) {
+            normal = shading_normal(index, barycentric, normal);
+        }
+        return 1.0 - (1.0 - pane_reflectance(dot(normal, direction), surface.eta)) * surface.opacity;
+    }
     uint texture = surface.textures_2 >> 16;
     if (HAS_TEXTURES && texture != 0u) {
         vec2 uv = texture_coordinates(primitive, index, point, barycentric);
@@ -40,14 +57,6 @@ void apply_textures(inout Surface surface, vec2 uv) {
     if (transmittance != 0u) {
         surface.transmittance = eval_texture(TEXTURE(transmittance - 1u), uv);
     }
-}
-
-// The normal of the BSDF's frame: that of the surface, or the interpolated one.
-vec3 shading_normal(uint index, vec2 barycentric, vec3 normal) {
-    Corners corners = CORNERS(index);
-    vec3 sum = corners.normal_a * (1.0 - barycentric.x - barycentric.y) + corners.normal_b * barycentric.x + corners.normal_c * barycentric.y;
-    float squared = dot(sum, sum);
-    return squared > 0.0 ? sum * inversesqrt(squared) : normal;
 }
 
 // The tangent of the BSDF's frame: the direction in which u grows, where it has one.

@@ -69,6 +69,8 @@ pub struct Features {
     pub shading_normals: bool,
     /// Surfaces with holes.
     pub masks: bool,
+    /// Thin panes, which light passes as it passes holes.
+    pub panes: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
     /// Surfaces with more than one BSDF.
@@ -152,6 +154,7 @@ impl Features {
             anisotropic: packed.surfaces.iter().any(|surface| surface.alpha != surface.alpha_v),
             shading_normals: flag(SURFACE_SMOOTH),
             masks: flag(SURFACE_MASK),
+            panes: flag(SURFACE_PANE),
             far_clip: {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
@@ -209,6 +212,7 @@ impl Features {
             anisotropic: true,
             shading_normals: true,
             masks: true,
+            panes: true,
             far_clip: true,
             tree: true,
             sealed: true,
@@ -256,6 +260,7 @@ impl Features {
             ("HAS_UVS", self.textures || self.anisotropic),
             ("HAS_SHADING_NORMALS", self.shading_normals),
             ("HAS_MASK", self.masks),
+            ("HAS_PANES", self.panes),
             ("HAS_FAR_CLIP", self.far_clip),
             ("HAS_BLENDS", self.blends),
             ("HAS_RELIEFS", self.reliefs),

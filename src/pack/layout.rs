@@ -472,6 +472,8 @@ pub const SURFACE_RELIEF_FLIPS: u32 = 2048;
 pub const SURFACE_RELIEF_FADES: u32 = 4096;
 /// Bit 13: seen from behind, normals are turned to the same sides as in front.
 pub const SURFACE_RELIEF_TURNS: u32 = 8192;
+/// Bit 14: a thin pane, which light passes straight on with the probability `opacity` times what is not reflected.
+pub const SURFACE_PANE: u32 = 16384;
 /// Where the kind of BSDF begins in [`Surface::flags`].
 pub const SURFACE_KIND_SHIFT: u32 = 16;
 /// Kind of BSDF: Lambert's law.
@@ -579,6 +581,7 @@ pub fn glsl() -> String {
         ("SURFACE_RELIEF_FLIPS", SURFACE_RELIEF_FLIPS),
         ("SURFACE_RELIEF_FADES", SURFACE_RELIEF_FADES),
         ("SURFACE_RELIEF_TURNS", SURFACE_RELIEF_TURNS),
+        ("SURFACE_PANE", SURFACE_PANE),
         ("SURFACE_KIND_SHIFT", SURFACE_KIND_SHIFT),
         ("BSDF_DIFFUSE", BSDF_DIFFUSE),
         ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),

@@ -322,6 +322,7 @@ const EMPTY_FEATURES: Features = Features {
     anisotropic: false,
     shading_normals: false,
     masks: false,
+    panes: false,
     far_clip: false,
     blends: false,
     reliefs: false,
@@ -393,7 +394,7 @@ fn pack_surfaces(
         Some(boundary) => (medium_index(boundary.interior), medium_index(exterior)),
         None => (0, 0),
     };
-    let mut chain = material::pack_chain(&shape.bsdf, textures, values);
+    let mut chain = material::pack_bsdf(&shape.bsdf, textures, values);
     let smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
     let smooth = if smooth && !material::is_null(&shape.bsdf) { SURFACE_SMOOTH } else { 0 };
     let uvs = if shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };

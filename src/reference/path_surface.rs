@@ -1,11 +1,12 @@
 //! Mirror of `shaders/lib/path_surface.glsl`: what a surface is at a point.
 
 use super::bindings::{Primitive, Surface, Tables};
+use super::bsdf::pane_reflectance;
 use super::math::{arctan2, orthonormal_frame};
 use super::texture::{eval_texture, texture_gradient};
 use crate::pack::layout::{
-    PRIMITIVE_SPHERE, SURFACE_HEIGHTS, SURFACE_INVERTED, SURFACE_RELIEF_FADES, SURFACE_RELIEF_FLIPS,
-    SURFACE_RELIEF_TURNS,
+    PRIMITIVE_SPHERE, SURFACE_HEIGHTS, SURFACE_INVERTED, SURFACE_PANE, SURFACE_RELIEF_FADES, SURFACE_RELIEF_FLIPS,
+    SURFACE_RELIEF_TURNS, SURFACE_SMOOTH,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
@@ -41,8 +42,20 @@ pub fn texture_coordinates(tables: &Tables, place: &Place) -> DVec2 {
     DVec2::new(u.dot(weights), corners.v.as_dvec3().dot(weights))
 }
 
-/// Probability that light meets a mask.
-pub fn opacity_at(tables: &Tables, surface: &Surface, place: &Place) -> f64 {
+/// Probability that light in a direction meets a surface that it may also pass: a mask, or a thin pane, of which `opacity` says how
+/// much of the light is left that it does not reflect.
+pub fn opacity_at(tables: &Tables, surface: &Surface, place: &Place, direction: DVec3) -> f64 {
+    if surface.flags & SURFACE_PANE != 0 {
+        let primitive = tables.primitive(place.index);
+        let normal = if is_sphere(primitive) {
+            (place.point - primitive.a).normalize()
+        } else {
+            (primitive.b - primitive.a).cross(primitive.c - primitive.a).normalize()
+        };
+        let smooth = surface.flags & SURFACE_SMOOTH != 0;
+        let normal = if smooth { shading_normal(tables, place, normal) } else { normal };
+        return 1.0 - (1.0 - pane_reflectance(normal.dot(direction), surface.eta)) * surface.opacity;
+    }
     let texture = surface.textures_2 >> 16;
     if texture == 0 {
         return surface.opacity;
