@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::mesh_file::MeshKey;
 use super::props::{Child, Props};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
-use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture};
+use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture, volume};
 use crate::scene::mesh::{self, FileMesh};
 use crate::scene::{
     Aov, Bitmap, Geometry, Grid, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape, Volume,
@@ -104,6 +104,14 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     declarations(&mut context, &props, &mut shapes)?;
     props.finish()?;
 
+    for (index, medium) in context.media.iter_mut().enumerate() {
+        let id = Some(MediumId(index as u32));
+        let filled: Vec<&Shape> =
+            shapes.iter().filter(|shape| shape.boundary.is_some_and(|both| both.interior == id)).collect();
+        if sensor.camera.medium != id {
+            volume::simplify(medium, &filled);
+        }
+    }
     if let Some(child) = integrator_child {
         integrator::warn_about_media(&mut context, child);
     }

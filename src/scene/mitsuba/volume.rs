@@ -8,7 +8,7 @@ use super::build::Context;
 use super::props::{Child, Given, Props, VolumeOrColor, unknown_plugin};
 use super::source;
 use super::texture::choice;
-use crate::scene::{Filter, Grid, GridVolume, HeightVolume, SceneError, Volume, Wrap};
+use crate::scene::{Filter, Geometry, Grid, GridVolume, HeightVolume, Medium, SceneError, Shape, Volume, Wrap};
 
 pub(super) const TYPES: [&str; 3] = ["constvolume", "gridvolume", "heightvolume"];
 
@@ -62,6 +62,34 @@ pub(super) fn coefficient<'a>(
             "heightvolume" => height(context, child, name),
             _ => Err(unknown_plugin(child.object, &TYPES)),
         },
+    }
+}
+
+/// Makes a medium homogeneous if its `sigma_t` is one voxel, in whose box lies all that the medium fills.
+pub(super) fn simplify(medium: &mut Medium, shapes: &[&Shape]) {
+    // Rounding must not leave a face outside that was meant to be on the box.
+    const SLACK: f64 = 1e-6;
+    let Some(Volume::Grid(GridVolume { grid, to_world, .. })) = &medium.volumes.sigma_t else { return };
+    if shapes.is_empty() || grid.resolution() != [1; 3] {
+        return;
+    }
+    let to_box = to_world.inverse();
+    let inside = |point: DVec3, reach: DVec3| {
+        let place = to_box.transform_point3(point);
+        (place - reach).min_element() >= -SLACK && (place + reach).max_element() <= 1.0 + SLACK
+    };
+    let filled = shapes.iter().all(|shape| match &shape.geometry {
+        Geometry::Mesh(mesh) => {
+            mesh.triangles.iter().flatten().all(|corner| inside(mesh.positions[*corner as usize], DVec3::ZERO))
+        }
+        Geometry::Sphere { center, radius, .. } => {
+            let reach = [0, 1, 2].map(|row| to_box.row(row).truncate().length() * radius);
+            inside(*center, DVec3::from(reach))
+        }
+    });
+    if filled {
+        medium.sigma_t *= DVec3::from(grid.voxel(0, 0, 0).map(f64::from));
+        medium.volumes.sigma_t = None;
     }
 }
 
