@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::mesh_file::MeshKey;
+use super::mesh_file::{Attributes, MeshKey};
 use super::props::{Child, Props};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
 use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture, volume};
@@ -30,6 +30,8 @@ pub(super) struct Context<'a> {
     medium_ids: HashMap<ObjectId, MediumId>,
     /// The `volumelight` by which a medium shines.
     pub volume_lights: HashMap<MediumId, ObjectId>,
+    /// Of the shape whose BSDF is being read.
+    pub attributes: Attributes,
     /// BSDFs that are being read, each inside of the one before it.
     pub open_bsdfs: Vec<ObjectId>,
 }
@@ -67,6 +69,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
         meshes,
         medium_ids,
         volume_lights: HashMap::new(),
+        attributes: Attributes::Unknown,
         open_bsdfs: Vec::new(),
     };
     let props = Props::new(tree, root);

@@ -5,7 +5,8 @@ use glam::{DMat3, DMat4, DVec3};
 use super::build::Context;
 use super::props::{Child, Props, unknown_plugin};
 use super::tree::Kind;
-use super::{bsdf, emitter, medium, mesh_file};
+use super::mesh_file::{self, Attributes};
+use super::{bsdf, emitter, medium};
 use crate::scene::mesh;
 use crate::scene::{Boundary, Bsdf, Geometry, SceneError, Shape};
 
@@ -15,6 +16,8 @@ pub(super) const TYPES: [&str; 10] =
 
 /// The points of a shape, and what was found out on the way.
 pub(super) struct Outline {
+    /// Further numbers of vertices and faces.
+    pub attributes: Attributes,
     /// `None` if nothing is left of a mesh.
     pub geometry: Option<Geometry>,
     pub name: String,
@@ -101,18 +104,20 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
         Some(emitter) => Some(emitter::area(context, emitter)?),
         None => None,
     };
-    let bsdf = match props.child(Kind::Bsdf)? {
-        Some(child) => bsdf::convert(context, child)?,
-        None => default_bsdf(context, child, emission, boundary),
-    };
     let flip = props.boolean("flip_normals")?.is_some_and(|given| given.value);
     // A weight of Mitsuba's gradients.
     props.float("silhouette_sampling_weight")?;
-    let outline = match plugin {
+    let mut outline = match plugin {
         "sphere" => sphere(&props, flip, outer)?,
         "obj" | "ply" | "serialized" => mesh_file::outline(context, child, &props, flip, outer)?,
         _ => analytic(&props, plugin, flip, outer)?,
     };
+    context.attributes = std::mem::take(&mut outline.attributes);
+    let bsdf = match props.child(Kind::Bsdf)? {
+        Some(child) => bsdf::convert(context, child)?,
+        None => default_bsdf(context, child, emission, boundary),
+    };
+    unfold(child, &std::mem::take(&mut context.attributes), &bsdf, &mut outline)?;
     props.finish()?;
     if matches!(plugin, "disk" | "cylinder") {
         let text = format!(
@@ -141,6 +146,24 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
     }
     let name = child.object.id.clone().unwrap_or(outline.name);
     Ok(outline.geometry.map(|geometry| Shape { name, geometry, bsdf, emission, boundary }))
+}
+
+/// Gives a mesh whose textures are attributes the texture coordinates of these.
+fn unfold(child: Child, attributes: &Attributes, bsdf: &Bsdf, outline: &mut Outline) -> Result<(), SceneError> {
+    if attributes.uses() == 0 {
+        return Ok(());
+    }
+    let textures = bsdf.textures().iter().filter(|texture| texture.constant().is_none()).count();
+    if textures > attributes.uses() || bsdf.needs_tangents() {
+        return Err(child.object.at.error(
+            "the BSDF of this shape has a \"mesh_attribute\" beside something that needs texture coordinates; only one of them is \
+             accepted",
+        ));
+    }
+    if let Some(Geometry::Mesh(mesh)) = &mut outline.geometry {
+        mesh::attributes::unfold(mesh);
+    }
+    Ok(())
 }
 
 /// What Mitsuba gives to a shape without a BSDF.
@@ -221,6 +244,7 @@ fn sphere(props: &Props, flip: bool, outer: &DMat4) -> Result<Outline, SceneErro
         return Err(props.at().error("the sphere overflows: its world-space centre or radius is not finite"));
     }
     Ok(Outline {
+        attributes: Attributes::none(),
         geometry: Some(Geometry::Sphere { center, radius, flipped: flip != mirrored }),
         name: "sphere".to_owned(),
         turned: !(linear * scale.recip()).abs_diff_eq(DMat3::IDENTITY, TOLERANCE),
@@ -249,6 +273,7 @@ fn analytic(props: &Props, plugin: &str, flip: bool, outer: &DMat4) -> Result<Ou
         return Err(props.at().error("the shape overflows: its world-space corners are not finite"));
     }
     Ok(Outline {
+        attributes: Attributes::none(),
         geometry: Some(Geometry::Mesh(mesh)),
         name: plugin.to_owned(),
         turned: false,
