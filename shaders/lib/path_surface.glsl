@@ -7,10 +7,21 @@ bool is_sphere(Primitive primitive) {
     return HAS_SPHERES && (primitive.surface & PRIMITIVE_SPHERE) != 0u;
 }
 
+// From the centre of a sphere to a point, in the axes of the sphere, which stand in the place of its corners' normals.
+vec3 to_sphere(Primitive primitive, Corners axes, vec3 point) {
+    vec3 outwards = point - primitive.a;
+    return vec3(dot(axes.normal_a, outwards), dot(axes.normal_b, outwards), dot(axes.normal_c, outwards));
+}
+
+// A vector in the axes of a sphere, in those of the scene.
+vec3 from_sphere(Corners axes, vec3 v) {
+    return axes.normal_a * v.x + axes.normal_b * v.y + axes.normal_c * v.z;
+}
+
 // Texture coordinates of a point on a primitive: a sphere's from the direction from its centre, (u, v) = (azimuth / 2 pi, polar angle / pi).
 vec2 texture_coordinates(Primitive primitive, uint index, vec3 point, vec2 barycentric) {
     if (is_sphere(primitive)) {
-        vec3 outwards = point - primitive.a;
+        vec3 outwards = to_sphere(primitive, CORNERS(index), point);
         float azimuth = arctan2(outwards.y, outwards.x) * (0.5 * INV_PI);
         return vec2(azimuth < 0.0 ? azimuth + 1.0 : azimuth, arctan2(length(outwards.xy), outwards.z) * INV_PI);
     }
@@ -63,8 +74,8 @@ void apply_textures(inout Surface surface, vec2 uv) {
 vec3 surface_tangent(Primitive primitive, uint index, vec3 point, vec3 axis) {
     vec3 along;
     if (is_sphere(primitive)) {
-        vec3 outwards = point - primitive.a;
-        along = vec3(-outwards.y, outwards.x, 0.0);
+        vec3 outwards = to_sphere(primitive, CORNERS(index), point);
+        along = from_sphere(CORNERS(index), vec3(-outwards.y, outwards.x, 0.0));
     } else {
         Corners corners = CORNERS(index);
         vec2 v = corners.v.yz - corners.v.x;
@@ -90,10 +101,10 @@ float share_at(Surface surface, Primitive primitive, uint index, vec3 point, vec
 // The derivatives of the place on a primitive by the texture coordinates; false where these are degenerate.
 bool place_derivatives(Primitive primitive, uint index, vec3 point, out vec3 dp_du, out vec3 dp_dv) {
     if (is_sphere(primitive)) {
-        vec3 outwards = point - primitive.a;
+        vec3 outwards = to_sphere(primitive, CORNERS(index), point);
         float flat_length = length(outwards.xy);
-        dp_du = 2.0 * PI * vec3(-outwards.y, outwards.x, 0.0);
-        dp_dv = PI * vec3(outwards.xy * (outwards.z / flat_length), -flat_length);
+        dp_du = from_sphere(CORNERS(index), 2.0 * PI * vec3(-outwards.y, outwards.x, 0.0));
+        dp_dv = from_sphere(CORNERS(index), PI * vec3(outwards.xy * (outwards.z / flat_length), -flat_length));
         return flat_length > 0.0;
     }
     Corners corners = CORNERS(index);

@@ -75,6 +75,8 @@ pub struct Features {
     pub far_clip: bool,
     /// Surfaces with more than one BSDF.
     pub blends: bool,
+    /// Lights with a texture in front of them.
+    pub slides: bool,
     /// Maps of normals or heights.
     pub reliefs: bool,
     /// A camera with a thin lens.
@@ -155,6 +157,7 @@ impl Features {
             shading_normals: flag(SURFACE_SMOOTH),
             masks: flag(SURFACE_MASK),
             panes: flag(SURFACE_PANE),
+            slides: packed.lights.iter().any(|light| light.texture != 0),
             far_clip: {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
@@ -213,6 +216,7 @@ impl Features {
             shading_normals: true,
             masks: true,
             panes: true,
+            slides: true,
             far_clip: true,
             tree: true,
             sealed: true,
@@ -261,6 +265,7 @@ impl Features {
             ("HAS_SHADING_NORMALS", self.shading_normals),
             ("HAS_MASK", self.masks),
             ("HAS_PANES", self.panes),
+            ("HAS_SLIDES", self.slides),
             ("HAS_FAR_CLIP", self.far_clip),
             ("HAS_BLENDS", self.blends),
             ("HAS_RELIEFS", self.reliefs),

@@ -334,6 +334,11 @@ gpu_struct! {
         normal: Vec3,
         /// Alias table: the light that is taken otherwise.
         alias: u32,
+        /// The second axis of a spot's picture; `edge_2` is the first one.
+        slide_y: Vec3,
+        /// Index plus one of a texture that colours the light, or 0: of a plane light over the coordinates along its edges, of a spot
+        /// over the tangents of the angles along the axes of its picture.
+        texture: u32,
     }
 }
 

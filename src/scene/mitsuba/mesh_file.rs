@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::DMat4;
+use glam::{DMat3, DMat4};
 
 use super::build::Context;
 use super::props::{Child, Given, Props};
@@ -183,7 +183,7 @@ pub(super) fn outline<'a>(
         attributes: Attributes::of(&mesh, read, faces),
         geometry: (!empty).then_some(Geometry::Mesh(mesh)),
         name: filename.value,
-        turned: false,
+        axes: DMat3::IDENTITY,
         mirrored: mirrors(&to_world).then_some(
             "to_world mirrors this mesh, which turns its normals around, as in Mitsuba; use flip_normals to turn them \
              back",
