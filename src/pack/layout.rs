@@ -226,8 +226,8 @@ gpu_struct! {
         u_c: f32,
         /// Second texture coordinates of the three corners.
         v: Vec3,
-        /// Fills the sixteen bytes.
-        unused: u32,
+        /// Number of the triangle in its shape.
+        number: u32,
     }
 }
 

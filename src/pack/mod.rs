@@ -176,7 +176,7 @@ impl Packed {
             let mut pictures = Pictures { textures: &mut textures, values: &mut values };
             pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights, &mut pictures);
             // Of a shape that is not packed at all there is nothing to see.
-            let described = scene.aovs.iter().any(|aov| aov.kind == AovKind::Uv) && primitives.len() > first;
+            let described = scene.aovs.iter().any(|aov| matches!(aov.kind, AovKind::Uv | AovKind::PrimitiveIndex)) && primitives.len() > first;
             if surface.flags & (SURFACE_SMOOTH | SURFACE_UVS) != 0 || described {
                 corners.resize(first, Corners::default());
                 corners.extend(texture::corners(shape));

@@ -114,7 +114,7 @@ pub fn corners(shape: &Shape) -> Vec<Corners> {
     };
     let normal = |corner: u32| mesh.normals.get(corner as usize).map_or(Vec3::ZERO, |normal| normal.as_vec3());
     let uv = |corner: u32| mesh.uvs.get(corner as usize).map_or(glam::Vec2::ZERO, |uv| uv.as_vec2());
-    let entry = |&[a, b, c]: &[u32; 3]| Corners {
+    let entry = |(number, &[a, b, c]): (u32, &[u32; 3])| Corners {
         normal_a: normal(a),
         u_a: uv(a).x,
         normal_b: normal(b),
@@ -122,7 +122,7 @@ pub fn corners(shape: &Shape) -> Vec<Corners> {
         normal_c: normal(c),
         u_c: uv(c).x,
         v: Vec3::new(uv(a).y, uv(b).y, uv(c).y),
-        unused: 0,
+        number,
     };
-    mesh.triangles.iter().map(entry).collect()
+    (0..).zip(&mesh.triangles).map(entry).collect()
 }

@@ -180,8 +180,9 @@ pub(super) fn outline<'a>(
         mesh.normals.clear();
     }
     Ok(Outline {
-        attributes: Attributes::of(&mesh, read, faces),
+        attributes: Attributes::of(&mesh, read.clone(), faces),
         geometry: (!empty).then_some(Geometry::Mesh(mesh)),
+        own_normals: !face_normals && !read.mesh.normals.is_empty(),
         name: filename.value,
         axes: DMat3::IDENTITY,
         mirrored: mirrors(&to_world).then_some(

@@ -21,6 +21,8 @@ pub(super) struct Outline {
     /// `None` if nothing is left of a mesh.
     pub geometry: Option<Geometry>,
     pub name: String,
+    /// Normals are those of a file.
+    pub own_normals: bool,
     /// Of a sphere: its axes in world space.
     pub axes: DMat3,
     /// How a mirroring transform changed the normals, if it did in a way that is worth a warning.
@@ -117,6 +119,14 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
         "obj" | "ply" | "serialized" => mesh_file::outline(context, child, &props, flip, outer)?,
         _ => analytic(&props, plugin, flip, outer)?,
     };
+    // Mitsuba sees the front of a surface on the side of its interpolated normals, and a mirror moves those of a file with the mesh. Media
+    // are on the sides of the triangles, whose order of corners stays.
+    if let (true, Some(_), Some(Geometry::Mesh(mesh)), None) =
+        (outline.own_normals, outline.mirrored, &mut outline.geometry, boundary)
+    {
+        mesh.flip();
+        outline.mirrored = None;
+    }
     context.attributes = std::mem::take(&mut outline.attributes);
     let bsdf = match props.child(Kind::Bsdf)? {
         Some(child) => bsdf::convert(context, child)?,
@@ -269,6 +279,7 @@ fn sphere(props: &Props, flip: bool, outer: &DMat4) -> Result<Outline, SceneErro
     }
     Ok(Outline {
         attributes: Attributes::none(),
+        own_normals: false,
         geometry: Some(Geometry::Sphere { center, radius, flipped: flip != mirrored }),
         name: "sphere".to_owned(),
         axes: linear * scale.recip(),
@@ -298,6 +309,7 @@ fn analytic(props: &Props, plugin: &str, flip: bool, outer: &DMat4) -> Result<Ou
     }
     Ok(Outline {
         attributes: Attributes::none(),
+        own_normals: false,
         geometry: Some(Geometry::Mesh(mesh)),
         name: plugin.to_owned(),
         axes: DMat3::IDENTITY,
