@@ -91,7 +91,14 @@ fn spots_fall_off_with_the_angle() {
             let theta = f64::to_radians(angle);
             let mut scene = floor(v(height * theta.tan(), 0.0, 0.0));
             let position = v(0.0, height, 0.0);
-            scene.lights.push(Light::Spot { position, direction: -DVec3::Y, intensity, cutoff_angle, beam_width, slide: None });
+            scene.lights.push(Light::Spot {
+                position,
+                direction: -DVec3::Y,
+                intensity,
+                cutoff_angle,
+                beam_width,
+                slide: None,
+            });
             let falloff = |angle: f64| {
                 if angle <= beam { 1.0 } else { ((cutoff - angle) / (cutoff - beam)).clamp(0.0, 1.0) }
             };

@@ -18,8 +18,8 @@ pub mod nesting;
 pub mod phase;
 pub mod sealed;
 pub mod sky;
-pub mod sobol;
 pub mod slide;
+pub mod sobol;
 mod support;
 pub mod texture;
 
@@ -176,7 +176,8 @@ impl Packed {
             let mut pictures = Pictures { textures: &mut textures, values: &mut values };
             pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights, &mut pictures);
             // Of a shape that is not packed at all there is nothing to see.
-            let described = scene.aovs.iter().any(|aov| matches!(aov.kind, AovKind::Uv | AovKind::PrimitiveIndex)) && primitives.len() > first;
+            let described = scene.aovs.iter().any(|aov| matches!(aov.kind, AovKind::Uv | AovKind::PrimitiveIndex))
+                && primitives.len() > first;
             if surface.flags & (SURFACE_SMOOTH | SURFACE_UVS) != 0 || described {
                 corners.resize(first, Corners::default());
                 corners.extend(texture::corners(shape));

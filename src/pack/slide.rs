@@ -47,8 +47,8 @@ pub fn on_plane(texture: &Texture, mesh: &Mesh, triangle: usize, frame: &Frame, 
     let plane = Plane::of(mesh, triangle);
     let world = |point: DVec3| point / frame.scale + frame.center;
     let origin = light.origin.as_dvec3();
-    let [corner, one, two] =
-        [origin, origin + light.edge_1.as_dvec3(), origin + light.edge_2.as_dvec3()].map(|point| plane.at(world(point)));
+    let [corner, one, two] = [origin, origin + light.edge_1.as_dvec3(), origin + light.edge_2.as_dvec3()]
+        .map(|point| plane.at(world(point)));
     over(texture, DAffine2::from_mat2_translation(DMat2::from_cols(one - corner, two - corner), corner))
 }
 

@@ -109,7 +109,8 @@ fn placed(to_uv: &DAffine2) -> Texture {
 /// does not have are 0.
 pub fn corners(shape: &Shape) -> Vec<Corners> {
     let Geometry::Mesh(mesh) = &shape.geometry else {
-        let [normal_a, normal_b, normal_c] = [shape.axes.x_axis, shape.axes.y_axis, shape.axes.z_axis].map(|axis| axis.as_vec3());
+        let [normal_a, normal_b, normal_c] =
+            [shape.axes.x_axis, shape.axes.y_axis, shape.axes.z_axis].map(|axis| axis.as_vec3());
         return vec![Corners { normal_a, normal_b, normal_c, ..Corners::default() }];
     };
     let normal = |corner: u32| mesh.normals.get(corner as usize).map_or(Vec3::ZERO, |normal| normal.as_vec3());

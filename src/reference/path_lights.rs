@@ -15,8 +15,8 @@ use super::path_state::{
     EMISSION_SETS, INFINITE_DISTANCE, Path, choose_light, sample_set, survival, survived_throughput,
 };
 use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
-use super::texture::eval_texture;
 use super::sky::{SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
+use super::texture::eval_texture;
 use crate::pack::layout::{
     LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_SPOT,
     LIGHT_TEXTURE_SHIFT, LIGHT_VOLUME, MEDIUM_EMISSION_GRID,

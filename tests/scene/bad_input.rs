@@ -231,8 +231,8 @@ fn shapes() {
             &["has anisotropic roughness", "no texture coordinates"],
         ),
         (
-            "‸<shape type=\"sphere\"><transform name=\"to_world\"><rotate x=\"1\" angle=\"5\"/></transform><bsdf type=\"diffuse\"><texture type=\"checkerboard\" name=\"reflectance\"/></bsdf></shape>",
-            &["has a texture", "turns or mirrors"],
+            "<shape type=\"sphere\">‸<emitter type=\"area\"><texture type=\"checkerboard\" name=\"radiance\"/></emitter></shape>",
+            &["the radiance of this lamp is a texture", "needs a mesh"],
         ),
         ("<shape type=\"cube\">‸<sensor type=\"perspective\"/></shape>", &["no use for <sensor"]),
         ("<shape type=\"cube\">‸<volume type=\"gridvolume\" name=\"a\"/></shape>", &["no use for <volume"]),

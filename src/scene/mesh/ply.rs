@@ -314,8 +314,7 @@ impl Further {
     /// Colours `r g b` or `red green blue` are `color`. Of what else there is, names that agree up to their last underscore are one
     /// attribute, of that name, with `_color` behind it if the first of them ends in `_r`. Mitsuba 3.9.1's rules.
     fn of(element: &ElementType, per_face: bool) -> Further {
-        const KNOWN: [&str; 12] =
-            ["x", "y", "z", "nx", "ny", "nz", "u", "v", "s", "t", "texture_u", "texture_v"];
+        const KNOWN: [&str; 12] = ["x", "y", "z", "nx", "ny", "nz", "u", "v", "s", "t", "texture_u", "texture_v"];
         let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
         let scalars = || element.properties.iter().enumerate().filter(|(_, property)| property.list.is_none());
         for names in [["r", "g", "b"], ["red", "green", "blue"]] {

@@ -11,14 +11,10 @@ use super::transform::rigid;
 use super::tree::Kind;
 use crate::scene::{Light, SceneError, Slide, Texture};
 
-pub(super) const TYPES: [&str; 7] =
-    ["area", "point", "spot", "directional", "constant", "envmap", "volumelight"];
+pub(super) const TYPES: [&str; 7] = ["area", "point", "spot", "directional", "constant", "envmap", "volumelight"];
 
 /// The radiance of an `area` emitter inside a shape, and a factor of it that depends on the place.
-pub(super) fn area<'a>(
-    context: &mut Context<'a>,
-    child: Child<'a>,
-) -> Result<(DVec3, Option<Texture>), SceneError> {
+pub(super) fn area<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<(DVec3, Option<Texture>), SceneError> {
     match child.object.plugin.as_str() {
         "area" => {}
         "point" | "spot" | "directional" | "constant" | "envmap" => {
@@ -43,7 +39,9 @@ pub(super) fn area<'a>(
 /// A texture in front of a light.
 fn shining<'a>(context: &mut Context<'a>, child: Child<'a>, name: &str) -> Result<Texture, SceneError> {
     if child.object.plugin == "mesh_attribute" {
-        return Err(child.at.error(format!("{name} cannot be a \"mesh_attribute\"; use \"bitmap\" with texture coordinates")));
+        return Err(child
+            .at
+            .error(format!("{name} cannot be a \"mesh_attribute\"; use \"bitmap\" with texture coordinates")));
     }
     let texture = texture::convert(context, child)?;
     let negative = match &texture {
@@ -98,7 +96,9 @@ pub(super) fn light<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<L
             return Err(child.at.error("<emitter type=\"area\"> must be inside the <shape> that is to shine"));
         }
         "volumelight" => {
-            return Err(child.at.error("<emitter type=\"volumelight\"> must be inside the <shape> whose medium is to shine"));
+            return Err(child
+                .at
+                .error("<emitter type=\"volumelight\"> must be inside the <shape> whose medium is to shine"));
         }
         _ => return Err(unknown_plugin(child.object, &TYPES)),
     };

@@ -6,7 +6,7 @@ use super::suggest::list;
 use super::tree::Kind;
 use crate::scene::{Aov, AovKind, Integrator, SceneError};
 
-pub(super) const TYPES: [&str; 6] = ["volpath", "volpathmis", "path", "direct", "moment", "aov"];
+pub(super) const TYPES: [&str; 7] = ["volpath", "volpathmis", "path", "ptracer", "direct", "moment", "aov"];
 
 /// The integrator of the scene. All types stand for the same estimator; `direct` is one of depth 2, and `moment` and `aov` are
 /// the one inside of them.
@@ -122,7 +122,7 @@ pub(super) fn warn_about_media<'a>(context: &mut Context<'a>, child: Child<'a>) 
         inner = *next;
     }
     let plugin = inner.object.plugin.as_str();
-    if matches!(plugin, "path" | "direct") && !context.media.is_empty() {
+    if matches!(plugin, "path" | "ptracer" | "direct") && !context.media.is_empty() {
         let text = format!("the media of the scene are rendered, which Mitsuba's \"{plugin}\" would ignore");
         context.warnings.push(child.at.warning(text));
     }

@@ -93,19 +93,15 @@ fn read<'a>(
         std::fs::read(&key.0).map_err(|cause| filename.at.error(format!("cannot read the mesh {shown}: {cause}")))?;
     let in_file = |text: String| filename.at.error(format!("cannot read the mesh {shown}: {text}"));
     let mesh = match format {
-        "obj" => obj::parse(&bytes).map(|obj| FileMesh {
-                mesh: obj.mesh,
-                attributes: Vec::new(),
-                missing_uvs: obj.missing_uvs,
-            }).map_err(
-            |error| SceneError::Asset {
+        "obj" => obj::parse(&bytes)
+            .map(|obj| FileMesh { mesh: obj.mesh, attributes: Vec::new(), missing_uvs: obj.missing_uvs })
+            .map_err(|error| SceneError::Asset {
                 file: shown.clone(),
                 line: error.line,
                 col: error.col,
                 message: error.message,
                 used_at: filename.at.to_string(),
-            },
-        )?,
+            })?,
         "ply" => ply::parse(&bytes).map_err(in_file)?,
         _ => serialized::parse(&bytes, shape_index).map_err(in_file)?,
     };

@@ -196,6 +196,7 @@ impl<'a> Props<'a> {
         let Some(property) = self.find(name) else { return Ok(None) };
         let Value::Object(id) = property.value else { return Ok(None) };
         let object = &self.tree.objects[id];
+        // What is something else is complained about by whoever asks for that.
         let child = Child { id, object, name: Some(name), at: &property.at };
         Ok((object.kind == Kind::Texture).then_some(child))
     }

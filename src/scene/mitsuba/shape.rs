@@ -3,9 +3,9 @@
 use glam::{DMat3, DMat4, DVec3};
 
 use super::build::Context;
+use super::mesh_file::{self, Attributes};
 use super::props::{Child, Props, unknown_plugin};
 use super::tree::Kind;
-use super::mesh_file::{self, Attributes};
 use super::{bsdf, emitter, medium};
 use crate::scene::mesh;
 use crate::scene::{Boundary, Bsdf, Geometry, SceneError, Shape, Texture};
@@ -165,15 +165,7 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
         context.warnings.push(child.object.at.warning(text));
     }
     let name = child.object.id.clone().unwrap_or(outline.name);
-    Ok(outline.geometry.map(|geometry| Shape {
-        name,
-        geometry,
-        bsdf,
-        emission,
-        emission_texture,
-        axes,
-        boundary,
-    }))
+    Ok(outline.geometry.map(|geometry| Shape { name, geometry, bsdf, emission, emission_texture, axes, boundary }))
 }
 
 /// Gives a mesh whose textures are attributes the texture coordinates of these.

@@ -124,19 +124,19 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
         "mesh_attribute" => {
             let name = props.string("name")?.ok_or_else(|| {
                 let what = child.object.describe();
-                child.object.at.error(format!("{what} needs <string name=\"name\" value=\"vertex_color\"/>, or another attribute"))
+                child
+                    .object
+                    .at
+                    .error(format!("{what} needs <string name=\"name\" value=\"vertex_color\"/>, or another attribute"))
             })?;
             let scale = props.float("scale")?.map_or(1.0, |given| given.value);
             props.finish()?;
             let image = context.attributes.image(&name.value, scale).map_err(|message| name.at.error(message))?;
             Ok(match image {
                 None => Texture::Constant(DVec3::splat(0.5)),
-                Some(bitmap) => Texture::Bitmap {
-                    bitmap,
-                    filter: Filter::Bilinear,
-                    wrap: Wrap::Clamp,
-                    to_uv: DAffine2::IDENTITY,
-                },
+                Some(bitmap) => {
+                    Texture::Bitmap { bitmap, filter: Filter::Bilinear, wrap: Wrap::Clamp, to_uv: DAffine2::IDENTITY }
+                }
             })
         }
         _ => Err(unknown_plugin(child.object, &TYPES)),
