@@ -343,7 +343,7 @@ fn lights_and_integrators() {
             "<emitter type=\"point\"><point name=\"position\" x=\"0\" y=\"0\" z=\"0\"/>‸<transform name=\"to_world\"/></emitter>",
             &["not both"],
         ),
-        ("‸<integrator type=\"ptracer\"/>", &["accepted types: volpath, volpathmis, path, direct"]),
+        ("‸<integrator type=\"depth\"/>", &["accepted types: volpath, volpathmis, path, ptracer, direct"]),
         ("<integrator type=\"path\">‸<integer name=\"max_depth\" value=\"0\"/></integrator>", &["at least 1"]),
         ("<integrator type=\"path\">‸<integer name=\"max_depth\" value=\"-2\"/></integrator>", &["-1 (no limit)"]),
         ("<integrator type=\"path\">‸<integer name=\"rr_depth\" value=\"0\"/></integrator>", &["at least 1"]),
