@@ -91,7 +91,14 @@ fn spots_fall_off_with_the_angle() {
             let theta = f64::to_radians(angle);
             let mut scene = floor(v(height * theta.tan(), 0.0, 0.0));
             let position = v(0.0, height, 0.0);
-            scene.lights.push(Light::Spot { position, direction: -DVec3::Y, intensity, cutoff_angle, beam_width });
+            scene.lights.push(Light::Spot {
+                position,
+                direction: -DVec3::Y,
+                intensity,
+                cutoff_angle,
+                beam_width,
+                slide: None,
+            });
             let falloff = |angle: f64| {
                 if angle <= beam { 1.0 } else { ((cutoff - angle) / (cutoff - beam)).clamp(0.0, 1.0) }
             };
@@ -112,7 +119,7 @@ fn spots_fall_off_with_the_angle() {
     let mut scene = floor(target);
     let offset: DVec3 = target - position;
     let direction = offset.normalize();
-    scene.lights.push(Light::Spot { position, direction, intensity, cutoff_angle: 1.0, beam_width: 0.5 });
+    scene.lights.push(Light::Spot { position, direction, intensity, cutoff_angle: 1.0, beam_width: 0.5, slide: None });
     let expected = intensity * (RHO / PI * -direction.y / offset.length_squared());
     check(seen(&scene), expected, 1e-4).unwrap_or_else(|why| panic!("{why}"));
 }

@@ -243,7 +243,7 @@ fn what_counts_as_a_rectangle() {
         let corner = Vec3::new(0.1, 0.2, 0.3);
         let triangles = [[corner, corner + one, corner + one + two], [corner, corner + one + two, corner + two]];
         let mut table = LightTable::default();
-        table.add_triangles(&triangles, DVec3::ONE);
+        table.add_triangles(&triangles, DVec3::ONE, |_| true);
         let lights = table.finish();
         assert_eq!(lights.len(), 1);
         lights[0].kind
@@ -256,7 +256,7 @@ fn what_counts_as_a_rectangle() {
     assert_eq!(kind(x, z * 0.2), LIGHT_RECTANGLE, "narrow");
     assert_eq!(kind(x, z * 0.02), LIGHT_QUAD, "too narrow");
     let mut table = LightTable::default();
-    table.add_triangles(&[[Vec3::ZERO, x, z]], DVec3::ONE);
+    table.add_triangles(&[[Vec3::ZERO, x, z]], DVec3::ONE, |_| true);
     assert_eq!(table.finish()[0].kind, LIGHT_TRIANGLE);
 }
 

@@ -10,6 +10,8 @@ mod bad_materials;
 mod check;
 #[path = "scene/crossings.rs"]
 mod crossings;
+#[path = "scene/dialect.rs"]
+mod dialect;
 #[path = "scene/docs.rs"]
 mod docs;
 #[path = "scene/features.rs"]

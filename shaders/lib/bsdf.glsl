@@ -38,6 +38,13 @@ float fresnel_dielectric(float cos_i, float eta, out float cos_t) {
     return 0.5 * (s * s + p * p);
 }
 
+// The fraction of light that a thin pane reflects: reflections between its two faces add up. Both of its sides are the same.
+float pane_reflectance(float cosine, float eta) {
+    float unused;
+    float f = fresnel_dielectric(abs(cosine), eta, unused);
+    return 2.0 * f / (1.0 + f);
+}
+
 // Fresnel's equations for a conductor with complex index eta + i k, relative to what is outside (Born and Wolf 1999, 14.2).
 vec3 fresnel_conductor(float cos_i, vec3 eta, vec3 k) {
     float c2 = cos_i * cos_i, s2 = 1.0 - c2;
@@ -230,14 +237,18 @@ BsdfValue eval_bsdf(Surface surface, vec3 wi, vec3 wo) {
 }
 
 BsdfSample sample_smooth_dielectric(Surface surface, vec3 wi, float lobe) {
+    if ((surface.flags & SURFACE_THIN) != 0u) {
+        // What gets through is not bent.
+        float f = pane_reflectance(wi.z, surface.eta);
+        if (HAS_PANES && (surface.flags & SURFACE_PANE) != 0u) {
+            // That the light does not pass was decided before, with this probability: see opacity_at().
+            return BsdfSample(reflect_z(wi), surface.specular * (f / (1.0 - (1.0 - f) * surface.opacity)), 0.0, 1.0);
+        }
+        return lobe < f ? BsdfSample(reflect_z(wi), surface.specular, 0.0, 1.0)
+                        : BsdfSample(-wi, surface.transmittance, 0.0, 1.0);
+    }
     float cos_t;
     float f = fresnel_dielectric(wi.z, surface.eta, cos_t);
-    if ((surface.flags & SURFACE_THIN) != 0u) {
-        // Reflections between the two faces add up; what gets through is not bent.
-        f = f < 1.0 ? 2.0 * f / (1.0 + f) : 1.0;
-        return lobe < f ? BsdfSample(reflect_z(wi), surface.specular, 0.0, 1.0)
-                              : BsdfSample(-wi, surface.transmittance, 0.0, 1.0);
-    }
     if (lobe < f) {
         return BsdfSample(reflect_z(wi), surface.specular, 0.0, 1.0);
     }

@@ -182,7 +182,7 @@ void cross_surface(inout Path path, Surface surface, Hit hit) {
 
 // Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
 bool passes_mask(inout Path path, Surface surface, Primitive primitive, Hit hit) {
-    float opacity = opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric);
+    float opacity = opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric, path.direction);
     float u = sample_set(path, MASK_SETS + path.crossings).x;
     path.crossings += 1u;
     path.passed *= 1.0 - opacity;
@@ -346,7 +346,7 @@ bool advance_shadow(inout Path path, inout Hit hit) {
     Primitive primitive = PRIMITIVE(hit.primitive);
     Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
     if (HAS_MASK && (primitive.surface & PRIMITIVE_BOUNDARY) == 0u) {
-        path.passed *= 1.0 - opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric);
+        path.passed *= 1.0 - opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric, path.direction);
     }
     float t_max = path.t_max;
     cross_surface(path, surface, hit);

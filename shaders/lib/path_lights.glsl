@@ -5,6 +5,7 @@
 #include "lib/path_aim.glsl"
 #include "lib/light.glsl"
 #include "lib/sky.glsl"
+#include "lib/texture.glsl"
 #include "lib/grid.glsl"
 
 // Weight of a direction found by scattering that light sampling finds with density light_pdf: the balance heuristic (Veach and
@@ -53,6 +54,22 @@ void add_sky(inout Path path) {
     }
 }
 
+// The colour of the texture in front of a light, for light in a direction from a point on it.
+vec3 slide_color(Light light, vec3 point, vec3 direction) {
+    if (!HAS_SLIDES || light.texture == 0u) {
+        return vec3(1.0);
+    }
+    vec2 place;
+    if (light.kind == LIGHT_SPOT) {
+        place = vec2(dot(direction, light.edge_2), dot(direction, light.slide_y)) / dot(direction, light.normal);
+    } else {
+        // The coordinates along the edges, which need not be perpendicular.
+        vec3 across = cross(light.edge_1, light.edge_2), offset = point - light.origin;
+        place = vec2(dot(cross(offset, light.edge_2), across), dot(cross(light.edge_1, offset), across)) / dot(across, across);
+    }
+    return eval_texture(TEXTURE(light.texture - 1u), place);
+}
+
 // Adds what a primitive emits towards the path.
 void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
     float cos_light = -dot(path.direction, normal);
@@ -70,7 +87,8 @@ void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
         pdf = area_pdf(light.area, t, cos_light);
     }
     float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * pdf : 0.0;
-    path.radiance += survived_throughput(path) * light.radiance * scattering_mis_weight(path, survival(path), light_pdf);
+    vec3 radiance = light.radiance * slide_color(light, path.origin + path.direction * t, -path.direction);
+    path.radiance += survived_throughput(path) * radiance * scattering_mis_weight(path, survival(path), light_pdf);
 }
 
 // Adds what voxels emit along the flight through a homogeneous medium: one point stands for the way through them.
@@ -146,6 +164,10 @@ bool sample_light(inout Path path, Vertex vertex, Aim aim, vec2 u, vec2 decision
         found = sample_rectangle_light(light, vertex.point, u);
     } else if (HAS_PLANE_LIGHTS) {
         found = sample_plane_light(light, vertex.point, u);
+    }
+    // Where nothing arrives, there need be no point.
+    if (HAS_SLIDES && light.texture != 0u && max_component(found.weight) > 0.0) {
+        found.weight *= slide_color(light, vertex.point + found.direction * found.distance, -found.direction);
     }
     BsdfValue scattering = eval_scattering(vertex, found.direction);
     path.direction = found.direction;

@@ -42,7 +42,7 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
         bool passes = HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u;
         if (HAS_MASK && counts && !passes) {
             Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
-            passes = (surface.flags & SURFACE_MASK) != 0u && opacity_at(surface, primitive, index, path.origin + path.direction * t, barycentric) < 1.0;
+            passes = (surface.flags & SURFACE_MASK) != 0u && opacity_at(surface, primitive, index, path.origin + path.direction * t, barycentric, path.direction) < 1.0;
         }
         hit.blocked = hit.blocked || (counts && !passes);
         if (counts && passes && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE))) {
@@ -59,7 +59,7 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
         if (HAS_MASK && opaque) {
             Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
             if ((surface.flags & SURFACE_MASK) != 0u) {
-                float opacity = opacity_at(surface, primitive, index, path.origin + path.direction * t, barycentric);
+                float opacity = opacity_at(surface, primitive, index, path.origin + path.direction * t, barycentric, path.direction);
                 hit.passed *= 1.0 - opacity;
                 opaque = opacity >= 1.0;
                 boundary = true;

@@ -1,15 +1,27 @@
 // What a surface is at a point: texture coordinates, colours, opacity, and the frame of its BSDF.
 #include "lib/path_state.glsl"
 #include "lib/texture.glsl"
+#include "lib/bsdf.glsl"
 
 bool is_sphere(Primitive primitive) {
     return HAS_SPHERES && (primitive.surface & PRIMITIVE_SPHERE) != 0u;
 }
 
+// From the centre of a sphere to a point, in the axes of the sphere, which stand in the place of its corners' normals.
+vec3 to_sphere(Primitive primitive, Corners axes, vec3 point) {
+    vec3 outwards = point - primitive.a;
+    return vec3(dot(axes.normal_a, outwards), dot(axes.normal_b, outwards), dot(axes.normal_c, outwards));
+}
+
+// A vector in the axes of a sphere, in those of the scene.
+vec3 from_sphere(Corners axes, vec3 v) {
+    return axes.normal_a * v.x + axes.normal_b * v.y + axes.normal_c * v.z;
+}
+
 // Texture coordinates of a point on a primitive: a sphere's from the direction from its centre, (u, v) = (azimuth / 2 pi, polar angle / pi).
 vec2 texture_coordinates(Primitive primitive, uint index, vec3 point, vec2 barycentric) {
     if (is_sphere(primitive)) {
-        vec3 outwards = point - primitive.a;
+        vec3 outwards = to_sphere(primitive, CORNERS(index), point);
         float azimuth = arctan2(outwards.y, outwards.x) * (0.5 * INV_PI);
         return vec2(azimuth < 0.0 ? azimuth + 1.0 : azimuth, arctan2(length(outwards.xy), outwards.z) * INV_PI);
     }
@@ -18,8 +30,24 @@ vec2 texture_coordinates(Primitive primitive, uint index, vec3 point, vec2 baryc
     return vec2(dot(vec3(corners.u_a, corners.u_b, corners.u_c), weights), dot(corners.v, weights));
 }
 
-// Probability that light meets a mask.
-float opacity_at(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric) {
+// The normal of the BSDF's frame: that of the surface, or the interpolated one.
+vec3 shading_normal(uint index, vec2 barycentric, vec3 normal) {
+    Corners corners = CORNERS(index);
+    vec3 sum = corners.normal_a * (1.0 - barycentric.x - barycentric.y) + corners.normal_b * barycentric.x + corners.normal_c * barycentric.y;
+    float squared = dot(sum, sum);
+    return squared > 0.0 ? sum * inversesqrt(squared) : normal;
+}
+
+// Probability that light in a direction meets a surface that it may also pass: a mask, or a thin pane, of which `opacity` says how
+// much of the light is left that it does not reflect.
+float opacity_at(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric, vec3 direction) {
+    if (HAS_PANES && (surface.flags & SURFACE_PANE) != 0u) {
+        vec3 normal = is_sphere(primitive) ? normalize(point - primitive.a) : normalize(cross(primitive.b - primitive.a, primitive.c - primitive.a));
+        if (HAS_SHADING_NORMALS && (surface.flags & SURFACE_SMOOTH) != 0u) {
+            normal = shading_normal(index, barycentric, normal);
+        }
+        return 1.0 - (1.0 - pane_reflectance(dot(normal, direction), surface.eta)) * surface.opacity;
+    }
     uint texture = surface.textures_2 >> 16;
     if (HAS_TEXTURES && texture != 0u) {
         vec2 uv = texture_coordinates(primitive, index, point, barycentric);
@@ -42,20 +70,12 @@ void apply_textures(inout Surface surface, vec2 uv) {
     }
 }
 
-// The normal of the BSDF's frame: that of the surface, or the interpolated one.
-vec3 shading_normal(uint index, vec2 barycentric, vec3 normal) {
-    Corners corners = CORNERS(index);
-    vec3 sum = corners.normal_a * (1.0 - barycentric.x - barycentric.y) + corners.normal_b * barycentric.x + corners.normal_c * barycentric.y;
-    float squared = dot(sum, sum);
-    return squared > 0.0 ? sum * inversesqrt(squared) : normal;
-}
-
 // The tangent of the BSDF's frame: the direction in which u grows, where it has one.
 vec3 surface_tangent(Primitive primitive, uint index, vec3 point, vec3 axis) {
     vec3 along;
     if (is_sphere(primitive)) {
-        vec3 outwards = point - primitive.a;
-        along = vec3(-outwards.y, outwards.x, 0.0);
+        vec3 outwards = to_sphere(primitive, CORNERS(index), point);
+        along = from_sphere(CORNERS(index), vec3(-outwards.y, outwards.x, 0.0));
     } else {
         Corners corners = CORNERS(index);
         vec2 v = corners.v.yz - corners.v.x;
@@ -81,10 +101,10 @@ float share_at(Surface surface, Primitive primitive, uint index, vec3 point, vec
 // The derivatives of the place on a primitive by the texture coordinates; false where these are degenerate.
 bool place_derivatives(Primitive primitive, uint index, vec3 point, out vec3 dp_du, out vec3 dp_dv) {
     if (is_sphere(primitive)) {
-        vec3 outwards = point - primitive.a;
+        vec3 outwards = to_sphere(primitive, CORNERS(index), point);
         float flat_length = length(outwards.xy);
-        dp_du = 2.0 * PI * vec3(-outwards.y, outwards.x, 0.0);
-        dp_dv = PI * vec3(outwards.xy * (outwards.z / flat_length), -flat_length);
+        dp_du = from_sphere(CORNERS(index), 2.0 * PI * vec3(-outwards.y, outwards.x, 0.0));
+        dp_dv = from_sphere(CORNERS(index), PI * vec3(outwards.xy * (outwards.z / flat_length), -flat_length));
         return flat_length > 0.0;
     }
     Corners corners = CORNERS(index);

@@ -69,10 +69,14 @@ pub struct Features {
     pub shading_normals: bool,
     /// Surfaces with holes.
     pub masks: bool,
+    /// Thin panes, which light passes as it passes holes.
+    pub panes: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
     /// Surfaces with more than one BSDF.
     pub blends: bool,
+    /// Lights with a texture in front of them.
+    pub slides: bool,
     /// Maps of normals or heights.
     pub reliefs: bool,
     /// A camera with a thin lens.
@@ -158,6 +162,8 @@ impl Features {
                 let index = primitive.surface & !(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE);
                 primitive.surface & PRIMITIVE_BOUNDARY == 0 && packed.surfaces[index as usize].flags & SURFACE_MASK != 0
             }),
+            panes: flag(SURFACE_PANE),
+            slides: packed.lights.iter().any(|light| light.texture != 0),
             far_clip: {
                 let eye = packed.params.camera_origin;
                 packed.params.far_clip < (eye.length() + packed.frame.radius as f32) * 1.01
@@ -216,6 +222,8 @@ impl Features {
             anisotropic: true,
             shading_normals: true,
             masks: true,
+            panes: true,
+            slides: true,
             far_clip: true,
             tree: true,
             sealed: true,
@@ -263,6 +271,8 @@ impl Features {
             ("HAS_UVS", self.textures || self.anisotropic),
             ("HAS_SHADING_NORMALS", self.shading_normals),
             ("HAS_MASK", self.masks),
+            ("HAS_PANES", self.panes),
+            ("HAS_SLIDES", self.slides),
             ("HAS_FAR_CLIP", self.far_clip),
             ("HAS_BLENDS", self.blends),
             ("HAS_RELIEFS", self.reliefs),

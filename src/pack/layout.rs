@@ -226,8 +226,8 @@ gpu_struct! {
         u_c: f32,
         /// Second texture coordinates of the three corners.
         v: Vec3,
-        /// Fills the sixteen bytes.
-        unused: u32,
+        /// Number of the triangle in its shape.
+        number: u32,
     }
 }
 
@@ -334,6 +334,11 @@ gpu_struct! {
         normal: Vec3,
         /// Alias table: the light that is taken otherwise.
         alias: u32,
+        /// The second axis of a spot's picture; `edge_2` is the first one.
+        slide_y: Vec3,
+        /// Index plus one of a texture that colours the light, or 0: of a plane light over the coordinates along its edges, of a spot
+        /// over the tangents of the angles along the axes of its picture.
+        texture: u32,
     }
 }
 
@@ -472,6 +477,8 @@ pub const SURFACE_RELIEF_FLIPS: u32 = 2048;
 pub const SURFACE_RELIEF_FADES: u32 = 4096;
 /// Bit 13: seen from behind, normals are turned to the same sides as in front.
 pub const SURFACE_RELIEF_TURNS: u32 = 8192;
+/// Bit 14: a thin pane, which light passes straight on with the probability `opacity` times what is not reflected.
+pub const SURFACE_PANE: u32 = 16384;
 /// Where the kind of BSDF begins in [`Surface::flags`].
 pub const SURFACE_KIND_SHIFT: u32 = 16;
 /// Kind of BSDF: Lambert's law.
@@ -579,6 +586,7 @@ pub fn glsl() -> String {
         ("SURFACE_RELIEF_FLIPS", SURFACE_RELIEF_FLIPS),
         ("SURFACE_RELIEF_FADES", SURFACE_RELIEF_FADES),
         ("SURFACE_RELIEF_TURNS", SURFACE_RELIEF_TURNS),
+        ("SURFACE_PANE", SURFACE_PANE),
         ("SURFACE_KIND_SHIFT", SURFACE_KIND_SHIFT),
         ("BSDF_DIFFUSE", BSDF_DIFFUSE),
         ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),

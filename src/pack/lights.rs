@@ -32,11 +32,19 @@ pub struct LightTable {
 impl LightTable {
     /// Adds the triangles of a lamp and returns the index of the light of each. Two neighbours that make up a parallelogram
     /// are one light.
-    pub fn add_triangles(&mut self, triangles: &[[Vec3; 3]], radiance: DVec3) -> Vec<u32> {
+    ///
+    /// `alike` says whether a triangle and the next one may be one light.
+    pub fn add_triangles(
+        &mut self,
+        triangles: &[[Vec3; 3]],
+        radiance: DVec3,
+        alike: impl Fn(usize) -> bool,
+    ) -> Vec<u32> {
         let mut indices = Vec::with_capacity(triangles.len());
         while indices.len() < triangles.len() {
             let first = triangles[indices.len()];
             let quad = triangles.get(indices.len() + 1).and_then(|second| parallelogram(first, *second));
+            let quad = quad.filter(|_| alike(indices.len()));
             let [corner, one, two] = quad.unwrap_or(first);
             let cross = (one - corner).cross(two - corner);
             let area = cross.length() * if quad.is_some() { 1.0 } else { 0.5 };
@@ -61,6 +69,17 @@ impl LightTable {
             }
         }
         indices
+    }
+
+    /// A light that was added.
+    pub fn get(&self, index: u32) -> &Light {
+        &self.lights[index as usize]
+    }
+
+    /// Puts a texture in front of a light: its index plus one, and its mean.
+    pub fn paint(&mut self, index: u32, texture: u32, mean: f64) {
+        self.lights[index as usize].texture = texture;
+        self.powers[index as usize] *= mean;
     }
 
     /// Adds a sphere that emits outwards (`side` 1) or inwards (−1) and returns its index.
@@ -89,8 +108,8 @@ impl LightTable {
         self.push(light, mean(emission.as_dvec3()) * 4.0 * PI * volume.volume)
     }
 
-    /// Adds a light that shines from one place or one direction; those of the whole sky are left out.
-    pub fn add_place(&mut self, light: &scene::Light, frame: &Frame) {
+    /// Adds a light that shines from one place or one direction, and returns its index; those of the whole sky are left out.
+    pub fn add_place(&mut self, light: &scene::Light, frame: &Frame) -> Option<u32> {
         match light {
             scene::Light::Point { position, intensity } => {
                 // Intensity over distance² is irradiance: it scales as an area.
@@ -101,9 +120,9 @@ impl LightTable {
                     radiance: scaled.as_vec3(),
                     ..Light::default()
                 };
-                self.push(light, mean(scaled) * 4.0 * PI);
+                Some(self.push(light, mean(scaled) * 4.0 * PI))
             }
-            scene::Light::Spot { position, direction, intensity, cutoff_angle, beam_width } => {
+            scene::Light::Spot { position, direction, intensity, cutoff_angle, beam_width, slide } => {
                 let scaled = *intensity * frame.scale.powi(2);
                 let [cutoff, beam] = [cutoff_angle, beam_width].map(|angle| angle.to_radians() as f32);
                 let slope = if cutoff > beam { 1.0 / (cutoff - beam) } else { 0.0 };
@@ -113,9 +132,11 @@ impl LightTable {
                     edge_1: Vec3::new(cutoff, beam, slope),
                     radiance: scaled.as_vec3(),
                     normal: direction.as_vec3(),
+                    edge_2: slide.as_ref().map_or(Vec3::ZERO, |slide| slide.x_axis.as_vec3()),
+                    slide_y: slide.as_ref().map_or(Vec3::ZERO, |slide| slide.y_axis.as_vec3()),
                     ..Light::default()
                 };
-                self.push(light, mean(scaled) * spot_solid_angle(f64::from(cutoff), f64::from(beam)));
+                Some(self.push(light, mean(scaled) * spot_solid_angle(f64::from(cutoff), f64::from(beam))))
             }
             scene::Light::Directional { direction, irradiance } => {
                 // Irradiance has the unit of radiance, but for the solid angle: the unit of length does not change it.
@@ -125,9 +146,9 @@ impl LightTable {
                     normal: direction.as_vec3(),
                     ..Light::default()
                 };
-                self.push(light, mean(*irradiance) * disc_area(frame));
+                Some(self.push(light, mean(*irradiance) * disc_area(frame)))
             }
-            scene::Light::Constant { .. } | scene::Light::Envmap { .. } => {}
+            scene::Light::Constant { .. } | scene::Light::Envmap { .. } => None,
         }
     }
 

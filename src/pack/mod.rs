@@ -18,6 +18,7 @@ pub mod nesting;
 pub mod phase;
 pub mod sealed;
 pub mod sky;
+pub mod slide;
 pub mod sobol;
 mod support;
 pub mod texture;
@@ -172,9 +173,11 @@ impl Packed {
             others.extend(chain.drain(1..));
             let surface = chain[0];
             let first = primitives.len();
-            pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights);
+            let mut pictures = Pictures { textures: &mut textures, values: &mut values };
+            pack_shape(shape, index as u32, &surface, &frame, &mut primitives, &mut lights, &mut pictures);
             // Of a shape that is not packed at all there is nothing to see.
-            let described = scene.aovs.iter().any(|aov| aov.kind == AovKind::Uv) && primitives.len() > first;
+            let described = scene.aovs.iter().any(|aov| matches!(aov.kind, AovKind::Uv | AovKind::PrimitiveIndex))
+                && primitives.len() > first;
             if surface.flags & (SURFACE_SMOOTH | SURFACE_UVS) != 0 || described {
                 corners.resize(first, Corners::default());
                 corners.extend(texture::corners(shape));
@@ -183,6 +186,12 @@ impl Packed {
             surfaces.push(surface);
         }
         surfaces.append(&mut others);
+        for (index, medium) in media.iter_mut().enumerate().skip(1) {
+            if let Some(volume) = emission::enclosing_volume(scene, &frame, MediumId(index as u32 - 1)) {
+                medium.light = lights.add_volume(volume, index as u32, medium.emission) + 1;
+            }
+        }
+        pack_places(scene, &frame, &mut lights, &mut Pictures { textures: &mut textures, values: &mut values });
         let mut textures = textures.textures;
         if textures.len() > texture::MAX_TEXTURES {
             return Err(PackError::TooManyTextures(textures.len()));
@@ -192,11 +201,6 @@ impl Packed {
         }
         if primitives.len() > bvh::MAX_PRIMITIVES {
             return Err(PackError::TooManyPrimitives(primitives.len()));
-        }
-        for (index, medium) in media.iter_mut().enumerate().skip(1) {
-            if let Some(volume) = emission::enclosing_volume(scene, &frame, MediumId(index as u32 - 1)) {
-                medium.light = lights.add_volume(volume, index as u32, medium.emission) + 1;
-            }
         }
         let first_sky = pack_lights(scene, &frame, &mut lights, &mut textures, &mut values)?;
         if !corners.is_empty() {
@@ -322,6 +326,8 @@ const EMPTY_FEATURES: Features = Features {
     anisotropic: false,
     shading_normals: false,
     masks: false,
+    panes: false,
+    slides: false,
     far_clip: false,
     blends: false,
     reliefs: false,
@@ -394,7 +400,7 @@ fn pack_surfaces(
         Some(boundary) => (medium_index(boundary.interior), medium_index(exterior)),
         None => (0, 0),
     };
-    let mut chain = material::pack_chain(&shape.bsdf, textures, values);
+    let mut chain = material::pack_bsdf(&shape.bsdf, textures, values);
     let smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
     let smooth = if smooth && !material::is_null(&shape.bsdf) { SURFACE_SMOOTH } else { 0 };
     let uvs = if shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };
@@ -415,6 +421,7 @@ fn pack_shape(
     frame: &Frame,
     primitives: &mut Vec<Primitive>,
     lights: &mut LightTable,
+    pictures: &mut Pictures,
 ) {
     let crossed = material::is_null(&shape.bsdf);
     if crossed && shape.boundary.is_none() && shape.emission.is_none() {
@@ -429,7 +436,18 @@ fn pack_shape(
                 .iter()
                 .map(|triangle| triangle.map(|corner| frame.point(mesh.positions[corner as usize])))
                 .collect();
-            let light_of = emission.map(|radiance| lights.add_triangles(&corners, radiance));
+            let picture = shape.emission_texture.as_ref().filter(|_| !mesh.uvs.is_empty());
+            let alike = |k: usize| picture.is_none() || slide::continues(mesh, k);
+            let light_of = emission.map(|radiance| lights.add_triangles(&corners, radiance, alike));
+            if let (Some(picture), Some(light_of)) = (picture, &light_of) {
+                for (k, &light) in light_of.iter().enumerate() {
+                    if k == 0 || light_of[k - 1] != light {
+                        let placed = slide::on_plane(picture, mesh, k, frame, lights.get(light));
+                        let (mean, texture) = pictures.textures.add_painted(&placed, pictures.values);
+                        lights.paint(light, texture, f64::from(mean.element_sum()) / 3.0);
+                    }
+                }
+            }
             primitives.extend(corners.iter().enumerate().map(|(k, &[a, b, c])| Primitive {
                 a,
                 surface: index | flags,
@@ -455,8 +473,26 @@ fn pack_shape(
     }
 }
 
-/// Adds the lights without a surface: first those that shine from one place or direction, then those of the whole sky. Returns the
-/// index of the first of the latter.
+/// Where textures and their pixels go.
+struct Pictures<'a> {
+    textures: &'a mut TextureTable,
+    values: &'a mut Vec<f32>,
+}
+
+/// Adds the lights that shine from one place or direction.
+fn pack_places(scene: &Scene, frame: &Frame, lights: &mut LightTable, pictures: &mut Pictures) {
+    // A light that is black has nothing to be found, and would be chosen in vain.
+    for light in scene.lights.iter().filter(|light| light.shines()) {
+        let index = lights.add_place(light, frame);
+        if let (Some(index), scene::Light::Spot { cutoff_angle, slide: Some(slide), .. }) = (index, light) {
+            let placed = slide::before_spot(&slide.texture, cutoff_angle.to_radians());
+            let (mean, texture) = pictures.textures.add_painted(&placed, pictures.values);
+            lights.paint(index, texture, f64::from(mean.element_sum()) / 3.0);
+        }
+    }
+}
+
+/// Adds the lights of the whole sky. Returns the index of the first of them.
 fn pack_lights(
     scene: &Scene,
     frame: &Frame,
@@ -466,9 +502,6 @@ fn pack_lights(
 ) -> Result<u32, PackError> {
     // A light that is black has nothing to be found, and would be chosen in vain.
     let shining = || scene.lights.iter().enumerate().filter(|(_, light)| light.shines());
-    for (_, light) in shining() {
-        lights.add_place(light, frame);
-    }
     let first_sky = lights.len();
     for (index, light) in shining() {
         match light {

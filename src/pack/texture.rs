@@ -29,6 +29,11 @@ impl TextureTable {
         }
     }
 
+    /// The same of a texture in front of a light, which has an entry, be it constant.
+    pub fn add_painted(&mut self, texture: &scene::Texture, values: &mut Vec<f32>) -> (Vec3, u32) {
+        self.entry(texture, values)
+    }
+
     /// The same of a texture that must have an entry, be it constant. Returns its index plus one.
     pub fn add_entry(&mut self, texture: &scene::Texture, values: &mut Vec<f32>) -> u32 {
         self.entry(texture, values).1
@@ -104,11 +109,13 @@ fn placed(to_uv: &DAffine2) -> Texture {
 /// does not have are 0.
 pub fn corners(shape: &Shape) -> Vec<Corners> {
     let Geometry::Mesh(mesh) = &shape.geometry else {
-        return vec![Corners::default()];
+        let [normal_a, normal_b, normal_c] =
+            [shape.axes.x_axis, shape.axes.y_axis, shape.axes.z_axis].map(|axis| axis.as_vec3());
+        return vec![Corners { normal_a, normal_b, normal_c, ..Corners::default() }];
     };
     let normal = |corner: u32| mesh.normals.get(corner as usize).map_or(Vec3::ZERO, |normal| normal.as_vec3());
     let uv = |corner: u32| mesh.uvs.get(corner as usize).map_or(glam::Vec2::ZERO, |uv| uv.as_vec2());
-    let entry = |&[a, b, c]: &[u32; 3]| Corners {
+    let entry = |(number, &[a, b, c]): (u32, &[u32; 3])| Corners {
         normal_a: normal(a),
         u_a: uv(a).x,
         normal_b: normal(b),
@@ -116,7 +123,7 @@ pub fn corners(shape: &Shape) -> Vec<Corners> {
         normal_c: normal(c),
         u_c: uv(c).x,
         v: Vec3::new(uv(a).y, uv(b).y, uv(c).y),
-        unused: 0,
+        number,
     };
-    mesh.triangles.iter().map(entry).collect()
+    (0..).zip(&mesh.triangles).map(entry).collect()
 }

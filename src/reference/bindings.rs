@@ -123,6 +123,8 @@ pub struct Light {
     pub alias_threshold: f64,
     pub normal: DVec3,
     pub alias: u32,
+    pub slide_y: DVec3,
+    pub texture: u32,
 }
 
 /// See [`layout::Params`].
@@ -286,6 +288,8 @@ impl From<&layout::Light> for Light {
             alias_threshold: f64::from(from.alias_threshold),
             normal: from.normal.as_dvec3(),
             alias: from.alias,
+            slide_y: from.slide_y.as_dvec3(),
+            texture: from.texture,
         }
     }
 }

@@ -6,7 +6,7 @@ use super::math::{exp_minus, minus_log_1m};
 use super::warp::{from_polar, square_to_cosine_hemisphere};
 use crate::pack::layout::{
     BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, BSDF_PLASTIC, SURFACE_GGX, SURFACE_KIND_SHIFT, SURFACE_NONLINEAR,
-    SURFACE_THIN,
+    SURFACE_PANE, SURFACE_THIN,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, PI};
@@ -240,15 +240,26 @@ fn eval_rough_dielectric(surface: &Surface, wi: DVec3, wo: DVec3) -> BsdfValue {
     BsdfValue { value, pdf: (1.0 - f) * facets * jacobian * eta * eta }
 }
 
+/// The fraction of light that a thin pane reflects: reflections between its two faces add up. Both of its sides are the same.
+pub fn pane_reflectance(cosine: f64, eta: f64) -> f64 {
+    let (f, _) = fresnel_dielectric(cosine.abs(), eta);
+    2.0 * f / (1.0 + f)
+}
+
 fn sample_smooth_dielectric(surface: &Surface, wi: DVec3, lobe: f64) -> BsdfSample {
-    let (f, cos_t) = fresnel_dielectric(wi.z, surface.eta);
     let reflection = BsdfSample { direction: reflect_z(wi), weight: surface.specular, ..NO_SAMPLE };
     if surface.flags & SURFACE_THIN != 0 {
-        // Reflections between the two faces add up; what gets through is not bent.
-        let f = if f < 1.0 { 2.0 * f / (1.0 + f) } else { 1.0 };
+        // What gets through is not bent.
+        let f = pane_reflectance(wi.z, surface.eta);
+        if surface.flags & SURFACE_PANE != 0 {
+            // That the light does not pass was decided before, with this probability: see `opacity_at`.
+            let met = 1.0 - (1.0 - f) * surface.opacity;
+            return BsdfSample { weight: reflection.weight * (f / met), ..reflection };
+        }
         let straight = BsdfSample { direction: -wi, weight: surface.transmittance, ..NO_SAMPLE };
         return if lobe < f { reflection } else { straight };
     }
+    let (f, cos_t) = fresnel_dielectric(wi.z, surface.eta);
     if lobe < f {
         return reflection;
     }

@@ -196,7 +196,7 @@ fn cross_surface(tables: &Tables, path: &mut Path, surface: &Surface, hit: &Hit)
 
 /// Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
 fn passes_mask(tables: &Tables, path: &mut Path, surface: &Surface, place: &Place) -> bool {
-    let opacity = opacity_at(tables, surface, place);
+    let opacity = opacity_at(tables, surface, place, path.direction);
     let u = sample_set(tables, path, MASK_SETS + path.crossings).x;
     path.crossings += 1;
     path.passed *= 1.0 - opacity;
@@ -346,7 +346,7 @@ fn advance_shadow(tables: &Tables, path: &mut Path, hit: &mut Hit) -> bool {
     if primitive.surface & PRIMITIVE_BOUNDARY == 0 {
         let point = path.origin + path.direction * hit.t;
         let place = Place { index: hit.primitive, point, barycentric: hit.barycentric };
-        path.passed *= 1.0 - opacity_at(tables, surface, &place);
+        path.passed *= 1.0 - opacity_at(tables, surface, &place, path.direction);
     }
     let t_max = path.t_max;
     cross_surface(tables, path, surface, hit);

@@ -16,6 +16,7 @@ use super::path_state::{
 };
 use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
 use super::sky::{SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
+use super::texture::eval_texture;
 use crate::pack::layout::{
     LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_SPOT,
     LIGHT_TEXTURE_SHIFT, LIGHT_VOLUME, MEDIUM_EMISSION_GRID,
@@ -71,6 +72,22 @@ pub fn add_sky(tables: &Tables, path: &mut Path) {
     }
 }
 
+/// The colour of the texture in front of a light, for light in a direction from a point on it.
+pub fn slide_color(tables: &Tables, light: &Light, point: DVec3, direction: DVec3) -> DVec3 {
+    if light.texture == 0 {
+        return DVec3::ONE;
+    }
+    let place = if light.kind == LIGHT_SPOT {
+        DVec2::new(direction.dot(light.edge_2), direction.dot(light.slide_y)) / direction.dot(light.normal)
+    } else {
+        // The coordinates along the edges, which need not be perpendicular.
+        let (across, offset) = (light.edge_1.cross(light.edge_2), point - light.origin);
+        let (s, t) = (offset.cross(light.edge_2).dot(across), light.edge_1.cross(offset).dot(across));
+        DVec2::new(s, t) / across.length_squared()
+    };
+    eval_texture(&tables.textures[light.texture as usize - 1], &tables.values, place)
+}
+
 /// Adds what a primitive emits towards the path.
 pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: f64, normal: DVec3) {
     let cos_light = -path.direction.dot(normal);
@@ -86,7 +103,8 @@ pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: 
     };
     let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
     let weight = scattering_mis_weight(tables, path, survival(tables, path), light_pdf);
-    path.radiance += survived_throughput(path) * light.radiance * weight;
+    let radiance = light.radiance * slide_color(tables, light, path.origin + path.direction * t, -path.direction);
+    path.radiance += survived_throughput(path) * radiance * weight;
 }
 
 /// Adds what voxels emit along the flight through a homogeneous medium: one point stands for the way through them.
@@ -171,12 +189,17 @@ pub fn sample_light(
             None => sample_plane_light(light, vertex.point, u),
         },
     };
+    let lit = vertex.point + found.direction * found.distance;
+    // Where nothing arrives, there need be no point.
+    let arrives = light.texture != 0 && max_component(found.weight) > 0.0;
+    let color = if arrives { slide_color(tables, light, lit, -found.direction) } else { DVec3::ONE };
+    let weight = found.weight * color;
     let scattering = eval_scattering(tables, vertex, found.direction);
     path.direction = found.direction;
     path.t_max = found.distance;
     path.light = index;
     path.light_channels = path.throughput * scattering.value;
-    path.light_weight = path.light_channels * found.weight / light.probability;
+    path.light_weight = path.light_channels * weight / light.probability;
     let pdf = aimed_pdf(aim, scattering.pdf, found.direction);
     path.pdf_ratio = if tables.features.mis && found.pdf > 0.0 { pdf / (found.pdf * light.probability) } else { 0.0 };
     path.light_medium = medium_towards(tables, vertex, path.medium, found.direction);

@@ -65,7 +65,7 @@ pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit:
         let surface = tables.surface_of(primitive);
         if counts && !passes && surface.flags & SURFACE_MASK != 0 {
             let place = Place { index, point: path.origin + path.direction * t, barycentric };
-            passes = opacity_at(tables, surface, &place) < 1.0;
+            passes = opacity_at(tables, surface, &place, path.direction) < 1.0;
         }
         hit.blocked |= counts && !passes;
         if counts && passes && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE)) {
@@ -82,7 +82,7 @@ pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit:
         let surface = tables.surface_of(primitive);
         if opaque && surface.flags & SURFACE_MASK != 0 {
             let place = Place { index, point: path.origin + path.direction * t, barycentric };
-            let opacity = opacity_at(tables, surface, &place);
+            let opacity = opacity_at(tables, surface, &place, path.direction);
             hit.passed *= 1.0 - opacity;
             opaque = opacity >= 1.0;
             boundary = true;

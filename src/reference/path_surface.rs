@@ -1,13 +1,14 @@
 //! Mirror of `shaders/lib/path_surface.glsl`: what a surface is at a point.
 
 use super::bindings::{Primitive, Surface, Tables};
+use super::bsdf::pane_reflectance;
 use super::math::{arctan2, orthonormal_frame};
 use super::texture::{eval_texture, texture_gradient};
 use crate::pack::layout::{
-    PRIMITIVE_SPHERE, SURFACE_HEIGHTS, SURFACE_INVERTED, SURFACE_RELIEF_FADES, SURFACE_RELIEF_FLIPS,
-    SURFACE_RELIEF_TURNS,
+    PRIMITIVE_SPHERE, SURFACE_HEIGHTS, SURFACE_INVERTED, SURFACE_PANE, SURFACE_RELIEF_FADES, SURFACE_RELIEF_FLIPS,
+    SURFACE_RELIEF_TURNS, SURFACE_SMOOTH,
 };
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
 /// A point on a primitive, as a ray finds it.
@@ -25,11 +26,17 @@ fn is_sphere(primitive: &Primitive) -> bool {
     primitive.surface & PRIMITIVE_SPHERE != 0
 }
 
+/// The axes of a sphere, which stand in the place of its corners' normals.
+fn sphere_axes(tables: &Tables, place: &Place) -> DMat3 {
+    let corners = &tables.corners[place.index as usize];
+    DMat3::from_cols(corners.normal_a.as_dvec3(), corners.normal_b.as_dvec3(), corners.normal_c.as_dvec3())
+}
+
 /// Texture coordinates of a point on a primitive: a sphere's from the direction from its centre, (azimuth / 2π, polar angle / π).
 pub fn texture_coordinates(tables: &Tables, place: &Place) -> DVec2 {
     let primitive = tables.primitive(place.index);
     if is_sphere(primitive) {
-        let outwards = place.point - primitive.a;
+        let outwards = sphere_axes(tables, place).transpose() * (place.point - primitive.a);
         let azimuth = arctan2(outwards.y, outwards.x) * 0.5 * FRAC_1_PI;
         let polar = arctan2(outwards.truncate().length(), outwards.z) * FRAC_1_PI;
         return DVec2::new(if azimuth < 0.0 { azimuth + 1.0 } else { azimuth }, polar);
@@ -41,8 +48,20 @@ pub fn texture_coordinates(tables: &Tables, place: &Place) -> DVec2 {
     DVec2::new(u.dot(weights), corners.v.as_dvec3().dot(weights))
 }
 
-/// Probability that light meets a mask.
-pub fn opacity_at(tables: &Tables, surface: &Surface, place: &Place) -> f64 {
+/// Probability that light in a direction meets a surface that it may also pass: a mask, or a thin pane, of which `opacity` says how
+/// much of the light is left that it does not reflect.
+pub fn opacity_at(tables: &Tables, surface: &Surface, place: &Place, direction: DVec3) -> f64 {
+    if surface.flags & SURFACE_PANE != 0 {
+        let primitive = tables.primitive(place.index);
+        let normal = if is_sphere(primitive) {
+            (place.point - primitive.a).normalize()
+        } else {
+            (primitive.b - primitive.a).cross(primitive.c - primitive.a).normalize()
+        };
+        let smooth = surface.flags & SURFACE_SMOOTH != 0;
+        let normal = if smooth { shading_normal(tables, place, normal) } else { normal };
+        return 1.0 - (1.0 - pane_reflectance(normal.dot(direction), surface.eta)) * surface.opacity;
+    }
     let texture = surface.textures_2 >> 16;
     if texture == 0 {
         return surface.opacity;
@@ -75,8 +94,9 @@ pub fn shading_normal(tables: &Tables, place: &Place, normal: DVec3) -> DVec3 {
 pub fn surface_tangent(tables: &Tables, place: &Place, axis: DVec3) -> DVec3 {
     let primitive = tables.primitive(place.index);
     let along = if is_sphere(primitive) {
-        let outwards = place.point - primitive.a;
-        DVec3::new(-outwards.y, outwards.x, 0.0)
+        let axes = sphere_axes(tables, place);
+        let outwards = axes.transpose() * (place.point - primitive.a);
+        axes * DVec3::new(-outwards.y, outwards.x, 0.0)
     } else {
         let corners = &tables.corners[place.index as usize];
         let v = corners.v.as_dvec3();
@@ -104,10 +124,11 @@ pub fn share_at(tables: &Tables, surface: &Surface, place: &Place) -> f64 {
 pub fn place_derivatives(tables: &Tables, place: &Place) -> Option<(DVec3, DVec3)> {
     let primitive = tables.primitive(place.index);
     if is_sphere(primitive) {
-        let outwards = place.point - primitive.a;
+        let axes = sphere_axes(tables, place);
+        let outwards = axes.transpose() * (place.point - primitive.a);
         let flat = outwards.truncate();
-        let dp_du = TAU * DVec3::new(-outwards.y, outwards.x, 0.0);
-        let dp_dv = PI * (flat * (outwards.z / flat.length())).extend(-flat.length());
+        let dp_du = axes * (TAU * DVec3::new(-outwards.y, outwards.x, 0.0));
+        let dp_dv = axes * (PI * (flat * (outwards.z / flat.length())).extend(-flat.length()));
         return (flat.length() > 0.0).then_some((dp_du, dp_dv));
     }
     let corners = &tables.corners[place.index as usize];

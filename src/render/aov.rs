@@ -83,6 +83,7 @@ fn first_hit(packed: &Packed, tables: &Tables, mut path: Path, aovs: &[Aov]) -> 
                 let flags = crate::pack::layout::PRIMITIVE_BOUNDARY | crate::pack::layout::PRIMITIVE_SPHERE;
                 values.push(f64::from((primitive.surface & !flags) + 1));
             }
+            AovKind::PrimitiveIndex => values.push(f64::from(tables.corners[index as usize].number)),
             AovKind::Albedo => {
                 let mut surface = *surface;
                 if surface.textures_1 != 0 {

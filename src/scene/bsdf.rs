@@ -276,6 +276,21 @@ impl Bsdf {
         }
     }
 
+    /// Whether it depends on the direction in which a texture coordinate grows.
+    pub fn needs_tangents(&self) -> bool {
+        match self {
+            Bsdf::RoughDielectric { roughness, .. } | Bsdf::RoughConductor { roughness, .. } => {
+                roughness.is_anisotropic()
+            }
+            Bsdf::Mask { nested, .. } => nested.needs_tangents(),
+            Bsdf::Blend { first, second, .. } | Bsdf::Sides { front: first, back: second } => {
+                first.needs_tangents() || second.needs_tangents()
+            }
+            Bsdf::Relief { .. } => true,
+            _ => false,
+        }
+    }
+
     /// Why it needs texture coordinates, if it does.
     pub fn needs_uvs(&self) -> Option<&'static str> {
         let anisotropic = match self {

@@ -240,6 +240,10 @@ pub struct Shape {
     pub bsdf: Bsdf,
     /// Radiance emitted on the side of the normal; a lamp if not `None`.
     pub emission: Option<DVec3>,
+    /// Factor of `emission` that depends on the place, ≥ 0; of meshes with texture coordinates alone.
+    pub emission_texture: Option<Texture>,
+    /// Of a sphere: its own axes, unit vectors perpendicular to each other, from which its texture coordinates are taken.
+    pub axes: DMat3,
     /// `Some` makes the surface a boundary between media.
     pub boundary: Option<Boundary>,
 }
@@ -252,6 +256,8 @@ impl Shape {
             geometry,
             bsdf: Bsdf::Null,
             emission: None,
+            emission_texture: None,
+            axes: DMat3::IDENTITY,
             boundary: Some(Boundary { interior: Some(interior), exterior: None }),
         }
     }
@@ -259,13 +265,24 @@ impl Shape {
     /// A surface that reflects diffusely on both sides.
     pub fn diffuse(name: &str, geometry: Geometry, reflectance: DVec3) -> Self {
         let bsdf = Bsdf::Diffuse { reflectance: reflectance.into(), two_sided: true };
-        Shape { name: name.to_owned(), geometry, bsdf, emission: None, boundary: None }
+        Shape {
+            name: name.to_owned(),
+            geometry,
+            bsdf,
+            emission: None,
+            emission_texture: None,
+            axes: DMat3::IDENTITY,
+            boundary: None,
+        }
     }
 
     /// A black surface that emits `radiance` on the side of its normal.
     pub fn lamp(name: &str, geometry: Geometry, radiance: DVec3) -> Self {
-        let bsdf = Bsdf::Diffuse { reflectance: DVec3::ZERO.into(), two_sided: false };
-        Shape { name: name.to_owned(), geometry, bsdf, emission: Some(radiance), boundary: None }
+        Shape {
+            bsdf: Bsdf::Diffuse { reflectance: DVec3::ZERO.into(), two_sided: false },
+            emission: Some(radiance),
+            ..Shape::diffuse(name, geometry, DVec3::ZERO)
+        }
     }
 }
 
@@ -284,7 +301,7 @@ pub enum Geometry {
     /// Triangles.
     Mesh(Mesh),
     /// A sphere; its normals point outwards unless `flipped`. Texture coordinates of the point with the unit outward
-    /// direction d: u = atan2(d.y, d.x) / 2π in \[0, 1), v = acos(d.z) / π.
+    /// direction d, in the [`Shape::axes`]: u = atan2(d.y, d.x) / 2π in \[0, 1), v = acos(d.z) / π.
     Sphere {
         /// Centre, in world space.
         center: DVec3,
@@ -362,6 +379,8 @@ pub enum Light {
         /// Half the opening angle of the part at full intensity, degrees, in \[0, cutoff_angle\]; where both are the same
         /// the edge is hard.
         beam_width: f64,
+        /// A picture in front of the light.
+        slide: Option<Slide>,
     },
     /// Parallel light from infinitely far.
     Directional {
@@ -382,6 +401,18 @@ pub enum Light {
         /// From the image's axes to the world's: a rotation, possibly with a mirror.
         to_world: DMat3,
     },
+}
+
+/// A picture in front of a spot, which colours its light. In axes of which z is the direction of the spot and x is the one here, light in
+/// the direction d meets the point (u, v) = (1/2, 1/2) + (d.x, d.y) / (2 d.z tan(cutoff)), as in Mitsuba 3.9.1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slide {
+    /// Factor of the intensity, ≥ 0.
+    pub texture: Texture,
+    /// The axis along which u grows, a unit vector perpendicular to the direction of the spot.
+    pub x_axis: DVec3,
+    /// The axis along which v grows.
+    pub y_axis: DVec3,
 }
 
 impl Light {

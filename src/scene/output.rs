@@ -26,11 +26,13 @@ pub enum AovKind {
     ShapeIndex,
     /// Diffusely reflected fraction.
     Albedo,
+    /// Number of the triangle in its shape, from 0.
+    PrimitiveIndex,
 }
 
 impl AovKind {
     /// Every kind by its name in scene files, with the names of its channels.
-    pub const ALL: [(&'static str, AovKind, &'static [&'static str]); 7] = [
+    pub const ALL: [(&'static str, AovKind, &'static [&'static str]); 8] = [
         ("depth", AovKind::Depth, &["T"]),
         ("position", AovKind::Position, &["X", "Y", "Z"]),
         ("uv", AovKind::Uv, &["U", "V"]),
@@ -38,6 +40,7 @@ impl AovKind {
         ("sh_normal", AovKind::ShadingNormal, &["X", "Y", "Z"]),
         ("shape_index", AovKind::ShapeIndex, &["I"]),
         ("albedo", AovKind::Albedo, &["R", "G", "B"]),
+        ("prim_index", AovKind::PrimitiveIndex, &["I"]),
     ];
 
     /// The names of its channels, behind the dot.

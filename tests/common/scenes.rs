@@ -224,7 +224,14 @@ pub fn spot_and_directional() -> Scene {
     let mut scene = still_life(true);
     let (position, direction) = (v(1.0, 1.5, 1.0), v(-0.8, -1.0, -0.7).normalize());
     let intensity = v(8.0, 6.0, 5.0);
-    scene.lights.push(Light::Spot { position, direction, intensity, cutoff_angle: 35.0, beam_width: 20.0 });
+    scene.lights.push(Light::Spot {
+        position,
+        direction,
+        intensity,
+        cutoff_angle: 35.0,
+        beam_width: 20.0,
+        slide: None,
+    });
     scene.lights.push(Light::Directional { direction: v(0.5, -1.0, -0.3).normalize(), irradiance: v(0.5, 0.7, 1.0) });
     scene
 }

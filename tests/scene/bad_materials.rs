@@ -141,7 +141,7 @@ fn spots_and_skies() {
             &["the spot's to_world stretches or shears"],
         ),
         (
-            "<emitter type=\"spot\">‸<texture type=\"checkerboard\" name=\"texture\"/></emitter>",
+            "<emitter type=\"spot\">‸<texture type=\"checkerboard\" name=\"picture\"/></emitter>",
             &["has no use for <texture"],
         ),
         ("<emitter type=\"spot\">‸<rgb name=\"intensity\" value=\"-1\"/></emitter>", &["must not be negative"]),

@@ -126,6 +126,21 @@ fn every_property_is_documented() {
         ("### `<emitter type=\"directional\">`", r#"<emitter type="directional">‸</emitter>"#, &[]),
         ("### `<emitter type=\"envmap\">`", sky, &[]),
         ("### `<emitter type=\"area\">`", r#"<shape type="cube"><emitter type="area">‸</emitter></shape>"#, &[]),
+        (
+            "### `<emitter type=\"volumelight\">`",
+            r#"<shape type="cube"><medium type="homogeneous" name="interior"/><emitter type="volumelight">‸</emitter></shape>"#,
+            &[],
+        ),
+        (
+            "### `<volume type=\"constvolume\">`",
+            r#"<medium type="heterogeneous"><volume type="constvolume" name="sigma_t">‸</volume></medium>"#,
+            &[],
+        ),
+        (
+            "### `<texture type=\"mesh_attribute\">`",
+            r#"<texture type="mesh_attribute"><string name="name" value="vertex_color"/>‸</texture>"#,
+            &[],
+        ),
         ("### `<emitter type=\"point\">`", r#"<emitter type="point">‸</emitter>"#, &[]),
         ("### `<emitter type=\"constant\">`", r#"<emitter type="constant">‸</emitter>"#, &[]),
     ] {
@@ -165,6 +180,7 @@ fn example(tag: &str, kind: &str) -> String {
                 string("filename", "textures/gray.png")
             )
         }
+        ("texture", "mesh_attribute") => string("name", "vertex_color"),
         ("texture", "bitmap") => string("filename", "textures/colors.png"),
         ("emitter", "envmap") => string("filename", "textures/sky.exr"),
         ("spectrum", "blackbody") => r#"<float name="temperature" value="1"/>"#.to_owned(),
@@ -189,6 +205,9 @@ fn example(tag: &str, kind: &str) -> String {
         ("rfilter", _) => sensor(&format!(r#"<film type="hdrfilm">{plugin}</film>"#)),
         ("spectrum", _) => format!(r#"<emitter type="constant">{plugin}</emitter>"#),
         ("volume", _) => format!(r#"<medium type="heterogeneous">{plugin}</medium>"#),
+        ("emitter", "volumelight") => {
+            format!(r#"<shape type="cube"><medium type="homogeneous" name="interior"/>{plugin}</shape>"#)
+        }
         ("emitter", "area") => format!(r#"<shape type="cube">{plugin}</shape>"#),
         _ => plugin,
     }

@@ -129,7 +129,7 @@ fn integrators_around_others() {
         (String::new(), "holds 0 integrators; it must hold one"),
         (inner.repeat(2), "holds 2 integrators; it must hold one"),
         (r#"<ref id="outer"/>"#.to_owned(), "cannot hold <integrator type=\"moment\">"),
-        (r#"<integrator type="ptracer"/>"#.to_owned(), "<integrator type=\"ptracer\"> is not supported"),
+        (r#"<integrator type="depth"/>"#.to_owned(), "<integrator type=\"depth\"> is not supported"),
     ] {
         let text = error(&format!(r#"<integrator type="moment" id="outer">{inside}</integrator>"#));
         assert!(text.contains(message), "{inside}: {text}");

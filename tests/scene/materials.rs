@@ -155,7 +155,9 @@ fn a_boundary_may_carry_any_bsdf() {
 
 #[test]
 fn spots() {
-    let Light::Spot { position, direction, intensity, cutoff_angle, beam_width } = light("spot", "") else { panic!() };
+    let Light::Spot { position, direction, intensity, cutoff_angle, beam_width, .. } = light("spot", "") else {
+        panic!()
+    };
     assert_eq!((position, direction, intensity), (DVec3::ZERO, DVec3::Z, DVec3::ONE));
     assert_eq!((cutoff_angle, beam_width), (20.0, 15.0));
     let Light::Spot { position, direction, cutoff_angle, beam_width, .. } = light(

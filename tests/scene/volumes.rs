@@ -36,7 +36,8 @@ fn defaults_and_constants() {
     assert!(plain.volumes.is_empty());
     assert_eq!((plain.sigma_t, plain.albedo, plain.emission), (DVec3::ONE, DVec3::splat(0.75), DVec3::ZERO));
     let constant = medium(
-        r#"<volume type="constvolume" name="sigma_t"><rgb name="value" value="1 2 3"/></volume><float name="scale" value="2"/>
+        r#"<volume type="constvolume" name="sigma_t"><rgb name="value" value="1 2 3"/>
+           <transform name="to_world"><translate x="-0.5" y="-0.5" z="-0.5"/><scale value="3"/></transform></volume><float name="scale" value="2"/>
            <volume type="constvolume" name="albedo"><float name="value" value="0.5"/></volume><rgb name="emission" value="1 0 2"/>"#,
     );
     assert!(constant.volumes.is_empty());

@@ -4,11 +4,13 @@ use glam::{DMat3, DMat4, DVec2, DVec3};
 
 use super::Mesh;
 
+pub mod attributes;
 pub mod obj;
 pub mod ply;
 mod round;
 pub mod serialized;
 
+pub use attributes::Attribute;
 pub use round::{SEGMENTS, cylinder, disk};
 
 /// A mesh as it is in a file: normals are unit vectors, or zero where the file has none for a vertex, and texture coordinates
@@ -17,6 +19,8 @@ pub use round::{SEGMENTS, cylinder, disk};
 pub struct FileMesh {
     /// The mesh; the lists of normals and texture coordinates are empty if the file has none at all.
     pub mesh: Mesh,
+    /// Further numbers of vertices and faces.
+    pub attributes: Vec<Attribute>,
     /// Vertices without texture coordinates in a file in which others have some; theirs are (0, 0).
     pub missing_uvs: usize,
 }

@@ -6,7 +6,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::FileMesh;
+use super::{Attribute, FileMesh};
 use crate::scene::Mesh;
 
 /// Reads a file. Normals are `nx ny nz`, texture coordinates `u v`, `s t` or
@@ -16,13 +16,14 @@ pub fn parse(bytes: &[u8]) -> Result<FileMesh, String> {
     let header = Header::read(bytes)?;
     let mut body = Body { bytes, at: header.end, line: header.lines, format: header.format };
     let (mut mesh, mut normals, mut uvs) = (Mesh::default(), false, false);
+    let mut attributes = Vec::new();
     let mut faces = false;
     for element in &header.elements {
         match element.name.as_str() {
-            "vertex" => (normals, uvs) = vertices(element, &mut body, &mut mesh)?,
+            "vertex" => (normals, uvs) = vertices(element, &mut body, &mut mesh, &mut attributes)?,
             "face" => {
                 faces = true;
-                polygons(element, &mut body, &mut mesh)?;
+                polygons(element, &mut body, &mut mesh, &mut attributes)?;
             }
             _ => {
                 for _ in 0..element.count {
@@ -40,7 +41,7 @@ pub fn parse(bytes: &[u8]) -> Result<FileMesh, String> {
         return Err(format!("a face names vertex {index}, but the file has {count} vertices, which count from 0"));
     }
     debug_assert_eq!((mesh.normals.is_empty(), mesh.uvs.is_empty()), (!normals || count == 0, !uvs || count == 0));
-    Ok(FileMesh { mesh, missing_uvs: 0 })
+    Ok(FileMesh { mesh, attributes, missing_uvs: 0 })
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -256,7 +257,12 @@ fn skip(properties: &[Property], body: &mut Body) -> Result<(), String> {
 }
 
 /// Reads all vertices; whether they have normals and texture coordinates.
-fn vertices(element: &ElementType, body: &mut Body, mesh: &mut Mesh) -> Result<(bool, bool), String> {
+fn vertices(
+    element: &ElementType,
+    body: &mut Body,
+    mesh: &mut Mesh,
+    attributes: &mut Vec<Attribute>,
+) -> Result<(bool, bool), String> {
     let find = |name: &str| element.properties.iter().position(|p| p.name == name && p.list.is_none());
     let all = |names: &[&str]| names.iter().map(|name| find(name)).collect::<Option<Vec<usize>>>();
     let Some(position) = all(&["x", "y", "z"]) else {
@@ -264,6 +270,7 @@ fn vertices(element: &ElementType, body: &mut Body, mesh: &mut Mesh) -> Result<(
     };
     let normal = all(&["nx", "ny", "nz"]);
     let uv = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"]].iter().find_map(|names| all(names));
+    let mut further = Further::of(element, false);
     let mut values = vec![0.0; element.properties.len()];
     for _ in 0..element.count {
         for (value, property) in values.iter_mut().zip(&element.properties) {
@@ -272,6 +279,7 @@ fn vertices(element: &ElementType, body: &mut Body, mesh: &mut Mesh) -> Result<(
                 Some(_) => skip(std::slice::from_ref(property), body)?,
             }
         }
+        further.take(&values, body)?;
         let vector = |at: &[usize]| DVec3::new(values[at[0]], values[at[1]], values[at[2]]);
         let place = vector(&position);
         if !place.is_finite() {
@@ -291,10 +299,78 @@ fn vertices(element: &ElementType, body: &mut Body, mesh: &mut Mesh) -> Result<(
             mesh.uvs.push(uv);
         }
     }
+    attributes.extend(further.attributes);
     Ok((normal.is_some(), uv.is_some()))
 }
 
-fn polygons(element: &ElementType, body: &mut Body, mesh: &mut Mesh) -> Result<(), String> {
+/// What an element has beside what every mesh needs.
+struct Further {
+    attributes: Vec<Attribute>,
+    /// Of each, the properties that it is made of, and what they are divided by.
+    parts: Vec<(Vec<usize>, f64)>,
+}
+
+impl Further {
+    /// Colours `r g b` or `red green blue` are `color`. Of what else there is, names that agree up to their last underscore are one
+    /// attribute, of that name, with `_color` behind it if the first of them ends in `_r`. Mitsuba 3.9.1's rules.
+    fn of(element: &ElementType, per_face: bool) -> Further {
+        const KNOWN: [&str; 12] = ["x", "y", "z", "nx", "ny", "nz", "u", "v", "s", "t", "texture_u", "texture_v"];
+        let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
+        let scalars = || element.properties.iter().enumerate().filter(|(_, property)| property.list.is_none());
+        for names in [["r", "g", "b"], ["red", "green", "blue"]] {
+            let at: Vec<usize> =
+                names.iter().filter_map(|name| scalars().find(|(_, p)| p.name == *name)).map(|(at, _)| at).collect();
+            if at.len() == 3 && groups.is_empty() {
+                groups.push(("color".to_owned(), at));
+            }
+        }
+        for (at, property) in scalars().filter(|(_, property)| !KNOWN.contains(&property.name.as_str())) {
+            let Some((prefix, postfix)) = property.name.rsplit_once('_') else { continue };
+            let name = if postfix == "r" { format!("{prefix}_color") } else { prefix.to_owned() };
+            match groups.last_mut() {
+                Some((last, members)) if last.strip_suffix("_color").unwrap_or(last) == prefix => members.push(at),
+                _ => groups.push((name, vec![at])),
+            }
+        }
+        let kind = if per_face { "face" } else { "vertex" };
+        let attributes = groups
+            .iter()
+            .map(|(name, at)| Attribute {
+                name: format!("{kind}_{name}"),
+                per_face,
+                channels: at.len(),
+                values: Vec::new(),
+            })
+            .collect();
+        let largest = |at: &[usize]| match element.properties[at[0]].kind {
+            Type::U8 => f64::from(u8::MAX),
+            Type::U16 => f64::from(u16::MAX),
+            _ => 1.0,
+        };
+        Further { attributes, parts: groups.into_iter().map(|(_, at)| (at.clone(), largest(&at))).collect() }
+    }
+
+    /// Takes the numbers of one vertex or face.
+    fn take(&mut self, values: &[f64], body: &Body) -> Result<(), String> {
+        for (attribute, (at, largest)) in self.attributes.iter_mut().zip(&self.parts) {
+            for &at in at {
+                let value = (values[at] / largest) as f32;
+                if !value.is_finite() {
+                    return body.error(&format!("{} is {}, which is not finite", attribute.name, values[at]));
+                }
+                attribute.values.push(value);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn polygons(
+    element: &ElementType,
+    body: &mut Body,
+    mesh: &mut Mesh,
+    attributes: &mut Vec<Attribute>,
+) -> Result<(), String> {
     let corners = |p: &Property| matches!(p.name.as_str(), "vertex_indices" | "vertex_index") && p.list.is_some();
     let Some(at) = element.properties.iter().position(corners) else {
         return Err("the faces have no list vertex_indices".to_owned());
@@ -302,8 +378,19 @@ fn polygons(element: &ElementType, body: &mut Body, mesh: &mut Mesh) -> Result<(
     let (before, after) = (&element.properties[..at], &element.properties[at + 1..]);
     let property = &element.properties[at];
     let length = property.list.expect("only a list is looked for");
+    let mut further = Further::of(element, true);
+    let mut values = vec![0.0; element.properties.len()];
+    let read = |properties: &[Property], values: &mut [f64], body: &mut Body| -> Result<(), String> {
+        for (value, property) in values.iter_mut().zip(properties) {
+            match property.list {
+                None => *value = body.number(property.kind)?,
+                Some(_) => skip(std::slice::from_ref(property), body)?,
+            }
+        }
+        Ok(())
+    };
     for _ in 0..element.count {
-        skip(before, body)?;
+        read(before, &mut values[..at], body)?;
         let count = body.length(length)?;
         if count < 3 {
             return body.error(&format!("a face has {count} corners; it must have at least 3"));
@@ -321,7 +408,12 @@ fn polygons(element: &ElementType, body: &mut Body, mesh: &mut Mesh) -> Result<(
             mesh.triangles.push([first, last, next]);
             last = next;
         }
-        skip(after, body)?;
+        read(after, &mut values[at + 1..], body)?;
+        // A polygon's numbers are those of all of its triangles.
+        for _ in 2..count {
+            further.take(&values, body)?;
+        }
     }
+    attributes.extend(further.attributes);
     Ok(())
 }

@@ -6,7 +6,7 @@ use std::io::Read;
 use flate2::read::ZlibDecoder;
 use glam::{DVec2, DVec3};
 
-use super::FileMesh;
+use super::{Attribute, FileMesh};
 use crate::scene::Mesh;
 
 const MAGIC: u16 = 0x041c;
@@ -101,8 +101,11 @@ impl<R: Read> Stream<R> {
                 .map(|_| Ok(DVec2::new(self.real(double)?, self.real(double)?)))
                 .collect::<Result<_, String>>()?;
         }
+        let mut attributes = Vec::new();
         if flags & COLORS != 0 {
-            self.vectors(vertices, double)?;
+            let colors = self.vectors(vertices, double)?;
+            let values = colors.iter().flat_map(|color| color.as_vec3().to_array()).collect();
+            attributes.push(Attribute { name: "vertex_color".to_owned(), per_face: false, channels: 3, values });
         }
         for _ in 0..triangles {
             let mut corners = [0; 3];
@@ -114,6 +117,6 @@ impl<R: Read> Stream<R> {
             }
             mesh.triangles.push(corners);
         }
-        Ok(FileMesh { mesh, missing_uvs: 0 })
+        Ok(FileMesh { mesh, attributes, missing_uvs: 0 })
     }
 }

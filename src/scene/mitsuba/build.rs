@@ -4,10 +4,10 @@ use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::mesh_file::MeshKey;
+use super::mesh_file::{Attributes, MeshKey};
 use super::props::{Child, Props};
 use super::tree::{Kind, Object, ObjectId, Property, Tree, Value};
-use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture};
+use super::{Loaded, bsdf, emitter, integrator, medium, sensor, shape, texture, volume};
 use crate::scene::mesh::{self, FileMesh};
 use crate::scene::{
     Aov, Bitmap, Geometry, GridFile, Integrator, Light, Medium, MediumId, Scene, SceneError, Shape, Volume,
@@ -27,6 +27,10 @@ pub(super) struct Context<'a> {
     /// Meshes as they are in their files.
     pub meshes: HashMap<MeshKey, Arc<FileMesh>>,
     medium_ids: HashMap<ObjectId, MediumId>,
+    /// The `volumelight` by which a medium shines.
+    pub volume_lights: HashMap<MediumId, ObjectId>,
+    /// Of the shape whose BSDF is being read.
+    pub attributes: Attributes,
     /// BSDFs that are being read, each inside of the one before it.
     pub open_bsdfs: Vec<ObjectId>,
 }
@@ -63,6 +67,8 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
         grids,
         meshes,
         medium_ids,
+        volume_lights: HashMap::new(),
+        attributes: Attributes::Unknown,
         open_bsdfs: Vec::new(),
     };
     let props = Props::new(tree, root);
@@ -100,6 +106,14 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     declarations(&mut context, &props, &mut shapes)?;
     props.finish()?;
 
+    for (index, medium) in context.media.iter_mut().enumerate() {
+        let id = Some(MediumId(index as u32));
+        let filled: Vec<&Shape> =
+            shapes.iter().filter(|shape| shape.boundary.is_some_and(|both| both.interior == id)).collect();
+        if sensor.camera.medium != id {
+            volume::simplify(medium, &filled);
+        }
+    }
     if let Some(child) = integrator_child {
         integrator::warn_about_media(&mut context, child);
     }

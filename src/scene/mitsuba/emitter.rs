@@ -5,16 +5,16 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec3};
 
 use super::build::Context;
-use super::props::{Child, Given, Props, unknown_plugin};
+use super::props::{Child, Colored, Given, Props, unknown_plugin};
 use super::texture;
 use super::transform::rigid;
 use super::tree::Kind;
-use crate::scene::{Light, SceneError};
+use crate::scene::{Light, SceneError, Slide, Texture};
 
-pub(super) const TYPES: [&str; 6] = ["area", "point", "spot", "directional", "constant", "envmap"];
+pub(super) const TYPES: [&str; 7] = ["area", "point", "spot", "directional", "constant", "envmap", "volumelight"];
 
-/// The radiance of an `area` emitter inside a shape.
-pub(super) fn area<'a>(context: &Context<'a>, child: Child<'a>) -> Result<DVec3, SceneError> {
+/// The radiance of an `area` emitter inside a shape, and a factor of it that depends on the place.
+pub(super) fn area<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<(DVec3, Option<Texture>), SceneError> {
     match child.object.plugin.as_str() {
         "area" => {}
         "point" | "spot" | "directional" | "constant" | "envmap" => {
@@ -26,10 +26,32 @@ pub(super) fn area<'a>(context: &Context<'a>, child: Child<'a>) -> Result<DVec3,
         _ => return Err(unknown_plugin(child.object, &TYPES)),
     }
     let props = context.props(child);
-    let radiance = positive("radiance", props.emission("radiance")?)?;
+    let radiance = match props.emission_or_texture("radiance")? {
+        Some(Colored::Texture(picture)) => (DVec3::ONE, Some(shining(context, picture, "radiance")?)),
+        Some(Colored::Constant(given)) => (positive("radiance", Some(given))?, None),
+        None => (DVec3::ONE, None),
+    };
     props.float("sampling_weight")?;
     props.finish()?;
     Ok(radiance)
+}
+
+/// A texture in front of a light.
+fn shining<'a>(context: &mut Context<'a>, child: Child<'a>, name: &str) -> Result<Texture, SceneError> {
+    if child.object.plugin == "mesh_attribute" {
+        return Err(child
+            .at
+            .error(format!("{name} cannot be a \"mesh_attribute\"; use \"bitmap\" with texture coordinates")));
+    }
+    let texture = texture::convert(context, child)?;
+    let negative = match &texture {
+        Texture::Bitmap { bitmap, .. } => bitmap.pixels().iter().flatten().any(|value| *value < 0.0),
+        _ => false,
+    };
+    if negative {
+        return Err(child.at.error(format!("the image of {name} has negative pixels; light must not be negative")));
+    }
+    Ok(texture)
 }
 
 /// An emitter that stands directly in the scene.
@@ -73,6 +95,11 @@ pub(super) fn light<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<L
         "area" => {
             return Err(child.at.error("<emitter type=\"area\"> must be inside the <shape> that is to shine"));
         }
+        "volumelight" => {
+            return Err(child
+                .at
+                .error("<emitter type=\"volumelight\"> must be inside the <shape> whose medium is to shine"));
+        }
         _ => return Err(unknown_plugin(child.object, &TYPES)),
     };
     // The weight only says how often Mitsuba picks the emitter.
@@ -107,7 +134,16 @@ fn spot<'a>(context: &mut Context<'a>, props: &Props<'a>) -> Result<Light, Scene
         None => DMat4::IDENTITY,
     };
     let (position, direction) = (to_world.w_axis.truncate(), to_world.z_axis.truncate());
-    Ok(Light::Spot { position, direction, intensity, cutoff_angle, beam_width })
+    let texture = match props.texture("texture")? {
+        Some(picture) => Some(shining(context, picture, "texture")?),
+        None => None,
+    };
+    if let (true, Some(given)) = (texture.is_some() && cutoff_angle >= 90.0, &cutoff) {
+        return Err(given.at.error("the cutoff_angle of a spot with a texture must be less than 90"));
+    }
+    let [x_axis, y_axis] = [to_world.x_axis.truncate(), to_world.y_axis.truncate()];
+    let slide = texture.map(|texture| Slide { texture, x_axis, y_axis });
+    Ok(Light::Spot { position, direction, intensity, cutoff_angle, beam_width, slide })
 }
 
 /// An image of the sky.

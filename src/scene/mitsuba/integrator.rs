@@ -6,7 +6,7 @@ use super::suggest::list;
 use super::tree::Kind;
 use crate::scene::{Aov, AovKind, Integrator, SceneError};
 
-pub(super) const TYPES: [&str; 6] = ["volpath", "volpathmis", "path", "direct", "moment", "aov"];
+pub(super) const TYPES: [&str; 7] = ["volpath", "volpathmis", "path", "ptracer", "direct", "moment", "aov"];
 
 /// The integrator of the scene. All types stand for the same estimator; `direct` is one of depth 2, and `moment` and `aov` are
 /// the one inside of them.
@@ -82,12 +82,17 @@ fn wrapped<'a>(context: &mut Context<'a>, child: Child<'a>, props: Props<'a>) ->
     props.integer("block_size")?;
     props.integer("samples_per_pass")?;
     props.finish()?;
+    if child.object.plugin == "aov" && inside.is_empty() {
+        // As in Mitsuba, there are the channels alone: the radiance is 0.
+        return Ok(Integrator { max_depth: Some(1), hide_emitters: true, ..Integrator::default() });
+    }
     let [inner] = inside[..] else {
         let (what, count) = (child.object.describe(), inside.len());
         return Err(child.object.at.error(format!("{what} holds {count} integrators; it must hold one")));
     };
     // One could hold itself by a <ref>.
-    if matches!(inner.object.plugin.as_str(), "moment" | "aov") {
+    let plugin = inner.object.plugin.as_str();
+    if plugin == "moment" || (plugin == "aov" && child.object.plugin == "aov") {
         let (what, found) = (child.object.describe(), inner.object.describe());
         return Err(inner.at.error(format!("{what} cannot hold {found}; it must hold one that renders")));
     }
@@ -112,9 +117,12 @@ fn aov(token: &str, given: &Given<String>) -> Result<Aov, SceneError> {
 /// Mitsuba's surface integrators see no media; ours always does.
 pub(super) fn warn_about_media<'a>(context: &mut Context<'a>, child: Child<'a>) {
     // What a wrapper holds was checked when it was read.
-    let inner = context.props(child).children(Kind::Integrator).first().copied().unwrap_or(child);
+    let mut inner = child;
+    while let Some(next) = context.props(inner).children(Kind::Integrator).first() {
+        inner = *next;
+    }
     let plugin = inner.object.plugin.as_str();
-    if matches!(plugin, "path" | "direct") && !context.media.is_empty() {
+    if matches!(plugin, "path" | "ptracer" | "direct") && !context.media.is_empty() {
         let text = format!("the media of the scene are rendered, which Mitsuba's \"{plugin}\" would ignore");
         context.warnings.push(child.at.warning(text));
     }

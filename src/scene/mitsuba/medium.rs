@@ -7,7 +7,7 @@ use super::props::{Child, Given, Props, VolumeOrColor, unknown_plugin};
 use super::spectrum::Meaning;
 use super::tree::Kind;
 use super::volume;
-use crate::scene::{Medium, Phase, SceneError, Volume, Volumes};
+use crate::scene::{Medium, MediumId, Phase, SceneError, Volume, Volumes};
 
 pub(super) const TYPES: [&str; 2] = ["homogeneous", "heterogeneous"];
 pub(super) const PHASE_TYPES: [&str; 5] = ["isotropic", "hg", "rayleigh", "blendphase", "tabphase"];
@@ -23,9 +23,7 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
     let (sigma_t, albedo) = (props.color("sigma_t")?, props.fraction("albedo")?);
     let (sigma_s, sigma_a) = (props.color("sigma_s")?, props.color("sigma_a")?);
     let (scale, emission) = (props.float("scale")?, props.emission("emission")?);
-    // Choices of Mitsuba's estimators; the medium is the same.
-    props.ignore_boolean("has_spectral_extinction")?;
-    props.ignore_boolean("sample_emitters")?;
+    estimators(context, &props)?;
     let phase = props.child(Kind::Phase)?;
     props.finish()?;
 
@@ -67,6 +65,41 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
     Ok(Medium { name: name_of(child), sigma_t, albedo, phase, emission, volumes: Volumes::default() })
 }
 
+/// Choices of Mitsuba's estimators, some of a version to come; the medium is the same.
+fn estimators<'a>(context: &mut Context<'a>, props: &Props<'a>) -> Result<(), SceneError> {
+    props.ignore_boolean("has_spectral_extinction")?;
+    props.ignore_boolean("sample_emitters")?;
+    props.string("medium_sampling_mode")?;
+    // Collisions without effect.
+    let sigma_n = props.color_or_volume("sigma_n", Meaning::Factor)?;
+    volume::coefficient(context, sigma_n, "sigma_n", DVec3::ZERO).map(drop)
+}
+
+/// Makes a medium shine, as the `volumelight` of a shape around it says.
+pub(super) fn shine<'a>(context: &mut Context<'a>, id: MediumId, emitter: Child<'a>) -> Result<(), SceneError> {
+    let props = context.props(emitter);
+    let radiance = props.color_or_volume("radiance", Meaning::Emitted)?;
+    props.float("sampling_weight")?;
+    props.finish()?;
+    let radiance = volume::coefficient(context, radiance, "emission", DVec3::ONE)?;
+    // A shape of a group is read for each of its instances, and what several shapes refer to is one light.
+    let known = context.volume_lights.insert(id, emitter.id);
+    let medium = &mut context.media[id.0 as usize];
+    if known.map_or(medium.emission != DVec3::ZERO, |known| known != emitter.id) {
+        let name = &medium.name;
+        return Err(emitter.at.error(format!("the medium \"{name}\" shines already; it can have one emission only")));
+    }
+    if matches!(medium.volumes.sigma_t, Some(Volume::Height(_))) {
+        return Err(emitter.at.error("a medium whose sigma_t is a heightvolume cannot emit"));
+    }
+    medium.emission = radiance.factor;
+    medium.volumes.emission = match radiance.field {
+        Some(Volume::Grid(field)) => Some(field),
+        _ => None,
+    };
+    Ok(())
+}
+
 /// What to call a medium in messages.
 fn name_of(child: Child) -> String {
     child.object.id.clone().unwrap_or_else(|| format!("medium at {}", child.object.at))
@@ -90,11 +123,15 @@ fn heterogeneous<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Medi
     let albedo = props.color_or_volume("albedo", Meaning::Fraction)?;
     let emission = props.color_or_volume("emission", Meaning::Emitted)?;
     let scale = props.float("scale")?;
-    props.ignore_boolean("has_spectral_extinction")?;
-    props.ignore_boolean("sample_emitters")?;
+    estimators(context, &props)?;
     let phase = props.child(Kind::Phase)?;
     props.finish()?;
     let scale = factor(scale)?;
+    if let Some(VolumeOrColor::Constant(given)) = &sigma_t {
+        context.warnings.push(given.at.warning(
+            "this medium fills all of its shape; with such a constant sigma_t Mitsuba fills the unit cube [0, 1]³ alone",
+        ));
+    }
     let at = |given: &Option<VolumeOrColor<'a>>| match given {
         Some(VolumeOrColor::Constant(given)) => given.at,
         Some(VolumeOrColor::Volume(child)) => child.at,

@@ -1,19 +1,79 @@
 //! Shapes from mesh files: `obj`, `ply` and `serialized`.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::DMat4;
+use glam::{DMat3, DMat4};
 
 use super::build::Context;
 use super::props::{Child, Given, Props};
 use super::shape::{Outline, mirrors, to_world};
 use super::source;
-use crate::scene::mesh::{FileMesh, obj, ply, serialized};
-use crate::scene::{Geometry, SceneError};
+use crate::scene::mesh::{FileMesh, attributes, obj, ply, serialized};
+use crate::scene::{Bitmap, Geometry, Mesh, SceneError};
 
 /// A mesh file, and which of the meshes in it.
 pub(super) type MeshKey = (PathBuf, &'static str, u64);
+
+/// The attributes of the shape that is being read.
+#[derive(Default)]
+pub(super) enum Attributes {
+    /// There is no shape: something that shapes refer to is looked at for faults.
+    #[default]
+    Unknown,
+    /// Those of a mesh.
+    Known {
+        /// The mesh in world space.
+        mesh: Mesh,
+        /// As it was in the file.
+        file: Arc<FileMesh>,
+        /// Which face of the file each triangle is.
+        faces: Vec<u32>,
+        /// The images that were made, by name and the bits of their factor.
+        images: HashMap<(String, u32), Arc<Bitmap>>,
+        /// How often a texture was one of them.
+        uses: usize,
+    },
+}
+
+impl Attributes {
+    /// Of a mesh from a file. What has none has none that could be named.
+    fn of(mesh: &Mesh, file: Arc<FileMesh>, faces: Vec<u32>) -> Attributes {
+        // The mesh is only needed for images.
+        let mesh = if file.attributes.is_empty() { Mesh::default() } else { mesh.clone() };
+        Attributes::Known { mesh, file, faces, images: HashMap::new(), uses: 0 }
+    }
+
+    /// Of a shape that is not from a file.
+    pub(super) fn none() -> Attributes {
+        let file = FileMesh { mesh: Mesh::default(), attributes: Vec::new(), missing_uvs: 0 };
+        Attributes::of(&Mesh::default(), Arc::new(file), Vec::new())
+    }
+
+    /// The image of an attribute; `None` where there is no shape to have it. The error lists the attributes that there are.
+    pub(super) fn image(&mut self, name: &str, scale: f64) -> Result<Option<Arc<Bitmap>>, String> {
+        let Attributes::Known { mesh, file, faces, images, uses } = self else { return Ok(None) };
+        let usable = || file.attributes.iter().filter(|attribute| matches!(attribute.channels, 1 | 3));
+        let Some(attribute) = usable().find(|attribute| attribute.name == name) else {
+            let names: Vec<&str> = usable().map(|attribute| attribute.name.as_str()).collect();
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            return Err(format!("this shape has no attribute \"{name}\" of one or three numbers; it has: {names}"));
+        };
+        let scale = scale as f32;
+        let image = images.entry((name.to_owned(), scale.to_bits()));
+        *uses += 1;
+        Ok(Some(image.or_insert_with(|| Arc::new(attribute.image(mesh, faces, scale))).clone()))
+    }
+
+    /// How many textures are attributes.
+    pub(super) fn uses(&self) -> usize {
+        match self {
+            Attributes::Unknown => 0,
+            Attributes::Known { uses, .. } => *uses,
+        }
+    }
+}
 
 /// Reads the file, unless another shape has done so.
 fn read<'a>(
@@ -33,15 +93,15 @@ fn read<'a>(
         std::fs::read(&key.0).map_err(|cause| filename.at.error(format!("cannot read the mesh {shown}: {cause}")))?;
     let in_file = |text: String| filename.at.error(format!("cannot read the mesh {shown}: {text}"));
     let mesh = match format {
-        "obj" => obj::parse(&bytes).map(|obj| FileMesh { mesh: obj.mesh, missing_uvs: obj.missing_uvs }).map_err(
-            |error| SceneError::Asset {
+        "obj" => obj::parse(&bytes)
+            .map(|obj| FileMesh { mesh: obj.mesh, attributes: Vec::new(), missing_uvs: obj.missing_uvs })
+            .map_err(|error| SceneError::Asset {
                 file: shown.clone(),
                 line: error.line,
                 col: error.col,
                 message: error.message,
                 used_at: filename.at.to_string(),
-            },
-        )?,
+            })?,
         "ply" => ply::parse(&bytes).map_err(in_file)?,
         _ => serialized::parse(&bytes, shape_index).map_err(in_file)?,
     };
@@ -85,7 +145,9 @@ pub(super) fn outline<'a>(
         let p = mesh.positions[vertex];
         return Err(at.error(format!("the mesh {shown} overflows: to_world moves a vertex to {p}")));
     }
+    let before = if read.attributes.is_empty() { Vec::new() } else { mesh.triangles.clone() };
     let dropped = mesh.drop_degenerate();
+    let faces = attributes::faces_left(&before, &mesh.triangles);
     if flip {
         mesh.flip();
     }
@@ -114,9 +176,11 @@ pub(super) fn outline<'a>(
         mesh.normals.clear();
     }
     Ok(Outline {
+        attributes: Attributes::of(&mesh, read.clone(), faces),
         geometry: (!empty).then_some(Geometry::Mesh(mesh)),
+        own_normals: !face_normals && !read.mesh.normals.is_empty(),
         name: filename.value,
-        turned: false,
+        axes: DMat3::IDENTITY,
         mirrored: mirrors(&to_world).then_some(
             "to_world mirrors this mesh, which turns its normals around, as in Mitsuba; use flip_normals to turn them \
              back",

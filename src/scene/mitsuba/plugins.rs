@@ -22,8 +22,7 @@ pub(super) const SUPPORTED: [(Kind, &[&str]); 13] = [
 
 /// Plugins of Mitsuba 3.9 that are not supported, and what to use instead. An entry of a plugin that is supported has no
 /// effect.
-pub(super) const REFUSED: [(Kind, &str, &str); 34] = [
-    (Kind::Integrator, "ptracer", "use \"volpath\": light is not traced from the emitters here"),
+pub(super) const REFUSED: [(Kind, &str, &str); 32] = [
     (Kind::Integrator, "depth", "use \"volpath\": only radiance is rendered"),
     (Kind::Integrator, "stokes", "use \"volpath\": light is not polarised here"),
     (Kind::Integrator, "prb", "use \"path\": nothing is differentiated here"),
@@ -53,7 +52,6 @@ pub(super) const REFUSED: [(Kind, &str, &str); 34] = [
     (Kind::Bsdf, "polarizer", "leave it out: light is not polarised here"),
     (Kind::Bsdf, "retarder", "leave it out: light is not polarised here"),
     (Kind::Bsdf, "circular", "leave it out: light is not polarised here"),
-    (Kind::Texture, "mesh_attribute", "use \"bitmap\" with texture coordinates"),
     (Kind::Texture, "volume", "use \"bitmap\""),
     (Kind::Spectrum, "srgb", "use <rgb>"),
     (Kind::Spectrum, "rawconstant", "use <rgb>"),

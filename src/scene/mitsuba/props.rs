@@ -183,6 +183,24 @@ impl<'a> Props<'a> {
         Ok(self.spectrum(name, Meaning::Fraction, true)?.map(Colored::Constant))
     }
 
+    /// A radiance, or a texture that has it.
+    pub fn emission_or_texture(&self, name: &'static str) -> Result<Option<Colored<'a>>, SceneError> {
+        match self.texture(name)? {
+            Some(texture) => Ok(Some(Colored::Texture(texture))),
+            None => Ok(self.spectrum(name, Meaning::Emitted, true)?.map(Colored::Constant)),
+        }
+    }
+
+    /// A texture of some name, if the property is one.
+    pub fn texture(&self, name: &'static str) -> Result<Option<Child<'a>>, SceneError> {
+        let Some(property) = self.find(name) else { return Ok(None) };
+        let Value::Object(id) = property.value else { return Ok(None) };
+        let object = &self.tree.objects[id];
+        // What is something else is complained about by whoever asks for that.
+        let child = Child { id, object, name: Some(name), at: &property.at };
+        Ok((object.kind == Kind::Texture).then_some(child))
+    }
+
     /// A coefficient of a medium: a quantity of each channel, or a field in space.
     pub fn color_or_volume(
         &self,

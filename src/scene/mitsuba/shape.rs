@@ -3,11 +3,12 @@
 use glam::{DMat3, DMat4, DVec3};
 
 use super::build::Context;
+use super::mesh_file::{self, Attributes};
 use super::props::{Child, Props, unknown_plugin};
 use super::tree::Kind;
-use super::{bsdf, emitter, mesh_file};
+use super::{bsdf, emitter, medium};
 use crate::scene::mesh;
-use crate::scene::{Boundary, Bsdf, Geometry, SceneError, Shape};
+use crate::scene::{Boundary, Bsdf, Geometry, SceneError, Shape, Texture};
 
 /// Shapes that have points.
 pub(super) const TYPES: [&str; 10] =
@@ -15,11 +16,15 @@ pub(super) const TYPES: [&str; 10] =
 
 /// The points of a shape, and what was found out on the way.
 pub(super) struct Outline {
+    /// Further numbers of vertices and faces.
+    pub attributes: Attributes,
     /// `None` if nothing is left of a mesh.
     pub geometry: Option<Geometry>,
     pub name: String,
-    /// `to_world` turns or mirrors a sphere, which has texture coordinates but no axes of its own.
-    pub turned: bool,
+    /// Normals are those of a file.
+    pub own_normals: bool,
+    /// Of a sphere: its axes in world space.
+    pub axes: DMat3,
     /// How a mirroring transform changed the normals, if it did in a way that is worth a warning.
     pub mirrored: Option<&'static str>,
 }
@@ -86,23 +91,48 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
         return Err(unknown_plugin(child.object, &TYPES));
     }
     let props = context.props(child);
+    let boundary = boundary(context, &props)?;
     let emission = match props.child(Kind::Emitter)? {
-        Some(emitter) => Some(emitter::area(context, emitter)?),
+        Some(emitter) if emitter.object.plugin == "volumelight" => {
+            let Some(medium) = boundary.and_then(|boundary| boundary.interior) else {
+                return Err(emitter.at.error(
+                    "<emitter type=\"volumelight\"> makes the medium inside of a shape shine; this one has no medium named \
+                     \"interior\"",
+                ));
+            };
+            medium::shine(context, medium, emitter)?;
+            None
+        }
+        Some(emitter) => Some((emitter::area(context, emitter)?, emitter)),
         None => None,
     };
-    let boundary = boundary(context, &props)?;
-    let bsdf = match props.child(Kind::Bsdf)? {
-        Some(child) => bsdf::convert(context, child)?,
-        None => default_bsdf(context, child, emission, boundary),
+    let (lamp, emission) = (emission.as_ref().map(|(_, emitter)| *emitter), emission.map(|(radiance, _)| radiance));
+    let (emission, emission_texture) = match emission {
+        Some((radiance, texture)) => (Some(radiance), texture),
+        None => (None, None),
     };
     let flip = props.boolean("flip_normals")?.is_some_and(|given| given.value);
     // A weight of Mitsuba's gradients.
     props.float("silhouette_sampling_weight")?;
-    let outline = match plugin {
+    let mut outline = match plugin {
         "sphere" => sphere(&props, flip, outer)?,
         "obj" | "ply" | "serialized" => mesh_file::outline(context, child, &props, flip, outer)?,
         _ => analytic(&props, plugin, flip, outer)?,
     };
+    // Mitsuba sees the front of a surface on the side of its interpolated normals, and a mirror moves those of a file with the mesh. Media
+    // are on the sides of the triangles, whose order of corners stays.
+    if let (true, Some(_), Some(Geometry::Mesh(mesh)), None) =
+        (outline.own_normals, outline.mirrored, &mut outline.geometry, boundary)
+    {
+        mesh.flip();
+        outline.mirrored = None;
+    }
+    context.attributes = std::mem::take(&mut outline.attributes);
+    let bsdf = match props.child(Kind::Bsdf)? {
+        Some(child) => bsdf::convert(context, child)?,
+        None => default_bsdf(context, child, emission, boundary),
+    };
+    unfold(child, &std::mem::take(&mut context.attributes), &bsdf, emission_texture.as_ref(), &mut outline)?;
     props.finish()?;
     if matches!(plugin, "disk" | "cylinder") {
         let text = format!(
@@ -116,21 +146,50 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
     if let (Some(why), Some(geometry)) = (bsdf.needs_uvs(), &outline.geometry) {
         let text = match geometry {
             Geometry::Mesh(mesh) if mesh.uvs.is_empty() => "but its mesh has no texture coordinates",
-            Geometry::Sphere { .. } if outline.turned => {
-                "but its to_world turns or mirrors it; only spheres that are moved and scaled can have one"
-            }
             _ => "",
         };
         if !text.is_empty() {
             return Err(child.object.at.error(format!("the BSDF of this shape has {why}, {text}")));
         }
     }
+    if let (Some(_), Some(geometry), Some(lamp)) = (&emission_texture, &outline.geometry, lamp)
+        && !matches!(geometry, Geometry::Mesh(mesh) if !mesh.uvs.is_empty())
+    {
+        return Err(lamp.at.error(
+            "the radiance of this lamp is a texture, which needs a mesh (or rectangle, cube, disk, cylinder) with texture coordinates",
+        ));
+    }
+    let axes = outline.axes;
     let sides_matter = emission.is_some() || boundary.is_some() || bsdf.sides_differ();
     if let Some(text) = outline.mirrored.filter(|_| sides_matter) {
         context.warnings.push(child.object.at.warning(text));
     }
     let name = child.object.id.clone().unwrap_or(outline.name);
-    Ok(outline.geometry.map(|geometry| Shape { name, geometry, bsdf, emission, boundary }))
+    Ok(outline.geometry.map(|geometry| Shape { name, geometry, bsdf, emission, emission_texture, axes, boundary }))
+}
+
+/// Gives a mesh whose textures are attributes the texture coordinates of these.
+fn unfold(
+    child: Child,
+    attributes: &Attributes,
+    bsdf: &Bsdf,
+    lamp: Option<&Texture>,
+    outline: &mut Outline,
+) -> Result<(), SceneError> {
+    if attributes.uses() == 0 {
+        return Ok(());
+    }
+    let textures = bsdf.textures().into_iter().chain(lamp).filter(|texture| texture.constant().is_none()).count();
+    if textures > attributes.uses() || bsdf.needs_tangents() {
+        return Err(child.object.at.error(
+            "the BSDF of this shape has a \"mesh_attribute\" beside something that needs texture coordinates; only one of them is \
+             accepted",
+        ));
+    }
+    if let Some(Geometry::Mesh(mesh)) = &mut outline.geometry {
+        mesh::attributes::unfold(mesh);
+    }
+    Ok(())
 }
 
 /// What Mitsuba gives to a shape without a BSDF.
@@ -211,9 +270,11 @@ fn sphere(props: &Props, flip: bool, outer: &DMat4) -> Result<Outline, SceneErro
         return Err(props.at().error("the sphere overflows: its world-space centre or radius is not finite"));
     }
     Ok(Outline {
+        attributes: Attributes::none(),
+        own_normals: false,
         geometry: Some(Geometry::Sphere { center, radius, flipped: flip != mirrored }),
         name: "sphere".to_owned(),
-        turned: !(linear * scale.recip()).abs_diff_eq(DMat3::IDENTITY, TOLERANCE),
+        axes: linear * scale.recip(),
         mirrored: mirrored.then_some(
             "to_world mirrors this sphere, which turns its normals around, as in Mitsuba; use flip_normals to turn \
              them back",
@@ -239,9 +300,11 @@ fn analytic(props: &Props, plugin: &str, flip: bool, outer: &DMat4) -> Result<Ou
         return Err(props.at().error("the shape overflows: its world-space corners are not finite"));
     }
     Ok(Outline {
+        attributes: Attributes::none(),
+        own_normals: false,
         geometry: Some(Geometry::Mesh(mesh)),
         name: plugin.to_owned(),
-        turned: false,
+        axes: DMat3::IDENTITY,
         mirrored: mirrored.then_some(
             "to_world mirrors this shape; its normals stay on the side that Mitsuba emits light from, where Mitsuba \
              swaps interior and exterior media",

@@ -10,7 +10,7 @@ use super::source;
 use crate::scene::error::Location;
 use crate::scene::{Bitmap, Filter, SceneError, Texture, Wrap, bitmap};
 
-pub(super) const TYPES: [&str; 2] = ["bitmap", "checkerboard"];
+pub(super) const TYPES: [&str; 3] = ["bitmap", "checkerboard", "mesh_attribute"];
 
 /// A reflectance or another factor that must lie in \[0, 1\], constant or textured.
 pub(super) fn fraction<'a>(
@@ -35,7 +35,19 @@ pub(super) fn fraction<'a>(
                 }
                 Texture::Bitmap { bitmap, .. } => {
                     let outside = |pixel: &[f32; 3]| pixel.iter().any(|value| !(0.0..=1.0).contains(value));
-                    if let Some(index) = bitmap.pixels().iter().position(outside) {
+                    // Of the four pixels of an attribute's triangle the last one is no value of it.
+                    let attribute = child.object.plugin == "mesh_attribute";
+                    let counts = |index: usize| {
+                        let (x, y) = (index % bitmap.width() as usize, index / bitmap.width() as usize);
+                        !attribute || x % 2 == 0 || y % 2 == 0
+                    };
+                    let pixels = || bitmap.pixels().iter().enumerate();
+                    if let Some((index, [r, g, b])) = pixels().find(|(index, pixel)| counts(*index) && outside(pixel)) {
+                        if attribute {
+                            return Err(child.at.error(format!(
+                                "{name} is [{r}, {g}, {b}] at a corner of the mesh; it must lie between 0 and 1"
+                            )));
+                        }
                         let (width, [r, g, b]) = (bitmap.width() as usize, bitmap.pixels()[index]);
                         let (x, y) = (index % width, index / width);
                         return Err(child.at.error(format!(
@@ -108,6 +120,24 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
             let to_uv = to_uv(&props)?;
             props.finish()?;
             Ok(Texture::Checkerboard { color0, color1, to_uv })
+        }
+        "mesh_attribute" => {
+            let name = props.string("name")?.ok_or_else(|| {
+                let what = child.object.describe();
+                child
+                    .object
+                    .at
+                    .error(format!("{what} needs <string name=\"name\" value=\"vertex_color\"/>, or another attribute"))
+            })?;
+            let scale = props.float("scale")?.map_or(1.0, |given| given.value);
+            props.finish()?;
+            let image = context.attributes.image(&name.value, scale).map_err(|message| name.at.error(message))?;
+            Ok(match image {
+                None => Texture::Constant(DVec3::splat(0.5)),
+                Some(bitmap) => {
+                    Texture::Bitmap { bitmap, filter: Filter::Bilinear, wrap: Wrap::Clamp, to_uv: DAffine2::IDENTITY }
+                }
+            })
         }
         _ => Err(unknown_plugin(child.object, &TYPES)),
     }

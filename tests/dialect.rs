@@ -1,0 +1,112 @@
+//! Pictures of what public scenes of Mitsuba have. Expected pixels are those of Mitsuba 3.9.1 (`llvm_ad_rgb`), the mean of 16 renders of
+//! 16,384 samples: `mi.render(mi.load_file(FILE, **parameters), spp=16384)`.
+
+mod common;
+
+use common::images::{Image, average, by_reference, on_device};
+use common::scenes::pack;
+use glam::DVec3;
+use std::path::Path;
+use tyndall::scene::{Scene, mitsuba};
+
+fn load(name: &str, parameters: &[(&str, &str)]) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mitsuba").join(name);
+    let parameters: Vec<(String, String)> = parameters.iter().map(|&(a, b)| (a.to_owned(), b.to_owned())).collect();
+    let loaded = mitsuba::load(&path, &parameters).expect("the scene is good");
+    assert_eq!(loaded.warnings, [""; 0], "{name}");
+    loaded.scene
+}
+
+/// The largest difference of a channel, beyond `relative` of what is expected.
+fn excess(image: &Image, expected: &[[f64; 3]], relative: f64) -> f64 {
+    assert_eq!(image.len(), expected.len());
+    let pairs = image.iter().zip(expected).map(|(pixel, expected)| (*pixel, DVec3::from(*expected)));
+    pairs.map(|(pixel, expected)| ((pixel - expected).abs() - relative * expected).max_element()).fold(0.0, f64::max)
+}
+
+fn brighter(expected: &[[f64; 3]], factor: f64) -> Vec<[f64; 3]> {
+    expected.iter().map(|pixel| pixel.map(|value| value * factor)).collect()
+}
+
+#[rustfmt::skip]
+const BUBBLE: [[f64; 3]; 24] = [
+    [0.3000, 0.3000, 0.3000], [0.2957, 0.2895, 0.2835], [0.3155, 0.2805, 0.2447], [0.7815, 0.8133, 0.8411],
+    [0.3339, 0.3279, 0.3206], [0.3000, 0.3000, 0.3000], [0.3000, 0.3000, 0.3000], [0.2682, 0.2412, 0.2157],
+    [0.2709, 0.2231, 0.1733], [0.3259, 0.2773, 0.1941], [0.3266, 0.2908, 0.2511], [0.3000, 0.3000, 0.3000],
+    [0.2904, 0.2906, 0.2909], [0.2383, 0.2150, 0.1933], [0.2140, 0.1795, 0.1362], [0.2236, 0.1972, 0.1191],
+    [0.2768, 0.2523, 0.2206], [0.3000, 0.3000, 0.3000], [0.1652, 0.1676, 0.1698], [0.1626, 0.1601, 0.1574],
+    [0.1572, 0.1390, 0.1211], [0.1690, 0.1530, 0.1341], [0.2375, 0.2468, 0.2550], [0.2540, 0.2715, 0.2884],
+];
+
+#[rustfmt::skip]
+const DIM_BUBBLE: [[f64; 3]; 24] = [
+    [0.3000, 0.3000, 0.3000], [0.2674, 0.2658, 0.2641], [0.1776, 0.1683, 0.1581], [0.6119, 0.6742, 0.7343],
+    [0.2918, 0.2924, 0.2924], [0.3000, 0.3000, 0.3000], [0.3000, 0.3000, 0.3000], [0.1621, 0.1551, 0.1481],
+    [0.1141, 0.1022, 0.0886], [0.1316, 0.1199, 0.0959], [0.1805, 0.1712, 0.1600], [0.3000, 0.3000, 0.3000],
+    [0.2903, 0.2905, 0.2908], [0.1412, 0.1357, 0.1301], [0.0891, 0.0814, 0.0704], [0.0930, 0.0882, 0.0669],
+    [0.1606, 0.1558, 0.1484], [0.3000, 0.3000, 0.3000], [0.1560, 0.1585, 0.1610], [0.1283, 0.1290, 0.1297],
+    [0.0676, 0.0638, 0.0600], [0.0756, 0.0734, 0.0703], [0.1999, 0.2129, 0.2257], [0.2477, 0.2659, 0.2840],
+];
+
+#[rustfmt::skip]
+const SLIDES: [[f64; 3]; 54] = [
+    [0.3654, 0.2375, 0.2445], [0.5259, 0.3420, 0.5215], [0.4311, 0.2827, 0.3227], [0.1684, 0.1397, 0.0506],
+    [0.1201, 0.1049, 0.0771], [0.0363, 0.0630, 0.1102], [0.0030, 0.0030, 0.0042], [0.0000, 0.0000, 0.0000],
+    [0.0000, 0.0000, 0.0000], [0.3624, 0.2332, 0.2246], [0.5075, 0.3330, 0.5123], [0.4409, 0.2876, 0.3205],
+    [0.1744, 0.1278, 0.0825], [0.0636, 0.0869, 0.1103], [0.0288, 0.0822, 0.0831], [0.0000, 0.0000, 0.0000],
+    [0.0000, 0.0000, 0.0000], [0.0000, 0.0000, 0.0000], [0.1132, 0.1116, 0.1261], [0.1167, 0.1272, 0.1761],
+    [0.1492, 0.1219, 0.1588], [0.1612, 0.1057, 0.1566], [0.1047, 0.1460, 0.1490], [0.0684, 0.1127, 0.1319],
+    [0.0804, 0.0803, 0.1284], [0.0936, 0.0936, 0.1414], [0.1044, 0.1044, 0.1417], [0.1269, 0.1266, 0.1631],
+    [0.1219, 0.1433, 0.1894], [0.1006, 0.1929, 0.2023], [0.1039, 0.1517, 0.2033], [0.0965, 0.1087, 0.1718],
+    [0.0940, 0.0746, 0.1589], [0.0965, 0.0408, 0.0952], [0.1016, 0.0756, 0.1189], [0.1100, 0.1101, 0.1356],
+    [0.1220, 0.1252, 0.1665], [0.0971, 0.1542, 0.1858], [0.0637, 0.2858, 0.2296], [0.0739, 0.2847, 0.2328],
+    [0.0815, 0.1329, 0.1597], [0.0921, 0.0538, 0.1412], [0.0969, 0.0301, 0.1018], [0.0965, 0.0444, 0.1067],
+    [0.1093, 0.1093, 0.1233], [0.1204, 0.1188, 0.1463], [0.0982, 0.1539, 0.1795], [0.0677, 0.2520, 0.2097],
+    [0.0794, 0.2604, 0.2043], [0.0939, 0.1495, 0.1558], [0.1046, 0.0965, 0.1488], [0.0954, 0.0527, 0.1016],
+    [0.1032, 0.0824, 0.1073], [0.1115, 0.1115, 0.1190],
+];
+
+#[test]
+fn light_passes_panes_without_an_event() {
+    for (parameters, expected) in [(&[][..], &BUBBLE), (&[("factor", "0.6"), ("depth", "3")][..], &DIM_BUBBLE)] {
+        let packed = pack(&load("panes.xml", parameters), 5);
+        assert!(packed.features.panes);
+        let device = on_device(&packed, 16384);
+        // Standard errors of Mitsuba's pixels are up to 0.0024, where the lamp is seen as a reflection.
+        let far = excess(&device, expected, 0.02);
+        assert!(far < 6e-3, "{parameters:?}: {far}");
+        // The planted faults: another brightness, and a path of one event less.
+        assert!(excess(&device, &brighter(expected, 1.08), 0.02) > 6e-3);
+        let mut short = load("panes.xml", parameters);
+        short.integrator.max_depth = short.integrator.max_depth.map(|depth| depth - 1);
+        assert!(excess(&on_device(&pack(&short, 5), 1024), expected, 0.02) > 6e-3, "{parameters:?}");
+        let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
+        let apart = device.iter().zip(&reference).filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count();
+        assert!(apart <= 2, "{apart} pixels differ");
+    }
+}
+
+#[test]
+fn pictures_in_front_of_lamps_and_colours_of_meshes() {
+    let scene = load("slides.xml", &[]);
+    let packed = pack(&scene, 5);
+    assert!(packed.features.slides);
+    let device = on_device(&packed, 16384);
+    // Standard errors of Mitsuba's pixels are up to 0.001.
+    let far = excess(&device, &SLIDES, 0.02);
+    assert!(far < 3e-3, "{far}");
+    assert!(excess(&device, &brighter(&SLIDES, 1.06), 0.02) > 3e-3);
+    // The planted faults: no picture in front of a lamp, and a ball whose axes are not turned.
+    let lamp = scene.shapes.iter().position(|shape| shape.emission_texture.is_some()).expect("there is one");
+    let ball = scene.shapes.iter().position(|shape| shape.axes != glam::DMat3::IDENTITY).expect("there is one");
+    let mut bare = scene.clone();
+    bare.shapes[lamp].emission_texture = None;
+    let mut straight = scene.clone();
+    straight.shapes[ball].axes = glam::DMat3::IDENTITY;
+    for wrong in [bare, straight] {
+        let far = excess(&on_device(&pack(&wrong, 5), 4096), &SLIDES, 0.02);
+        assert!(far > 6e-3, "{far}");
+    }
+    let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
+    assert!((average(&device) - average(&reference)).abs().max_element() < 1e-3);
+}
