@@ -1,7 +1,7 @@
 //! How distances are sampled in each medium.
 
 use super::frame::{Bounds, Frame};
-use super::layout::{Light, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, Medium};
+use super::layout::{LIGHT_VOLUME, Light, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, Medium};
 use super::lights::is_near;
 use super::nesting::Nesting;
 use crate::scene::{MediumId, Scene};
@@ -17,10 +17,15 @@ const THIN_BESIDE: f64 = 3.0;
 /// A light further than this share of a medium's size from the box about it shines on all of it alike.
 const NEAR: f64 = 0.5;
 
+/// Whether a light is brightest near some place. A medium that emits shines all over.
+fn is_lamp(light: &Light) -> bool {
+    is_near(light) && light.kind != LIGHT_VOLUME
+}
+
 /// Switches equiangular sampling, and directions past lamps, on for thin media that have a light in or near them. Behind glass light never
 /// arrives directly.
 pub fn choose_equiangular(scene: &Scene, nesting: &Nesting, frame: &Frame, lights: &[Light], media: &mut [Medium]) {
-    if !lights.iter().any(is_near) || scene.integrator.max_depth.is_some_and(|depth| depth < 2) {
+    if !lights.iter().any(is_lamp) || scene.integrator.max_depth.is_some_and(|depth| depth < 2) {
         return;
     }
     for (index, medium) in media.iter_mut().enumerate().skip(1) {
@@ -38,7 +43,7 @@ pub fn choose_equiangular(scene: &Scene, nesting: &Nesting, frame: &Frame, light
         let holds = |room: f64| {
             let room = Vec3::splat((room * size) as f32);
             let inside = |place: Vec3| place.cmpge(min - room).all() && place.cmple(max + room).all();
-            lights.iter().any(|light| is_near(light) && inside(light.origin))
+            lights.iter().any(|light| is_lamp(light) && inside(light.origin))
         };
         let depth = extent * f64::from(medium.sigma_t.element_sum() / 3.0);
         let thin = depth < THIN && (everywhere || holds(0.0)) || depth < THIN_BESIDE && holds(NEAR);
