@@ -29,11 +29,13 @@ const MOST_SAMPLES: u32 = 1 << 30;
 pub enum Lever {
     /// Nothing: as the program renders.
     All,
-    /// Without the pilot run and its roulette.
+    /// Without the pilot run: no roulette by it, and no paths that pixels share.
     NoPilot,
+    /// With paths of its own for each pixel.
+    NoSharing,
     /// With all primitives in the tree.
     NoImmediates,
-    /// Without equiangular distances.
+    /// Without equiangular distances and directions past lamps.
     NoEquiangular,
     /// With light sampled in media that no shadow ray leaves.
     NoSeals,
@@ -41,14 +43,15 @@ pub enum Lever {
 
 impl Lever {
     /// All of them, the whole program first.
-    pub const LEVERS: [Lever; 5] =
-        [Lever::All, Lever::NoPilot, Lever::NoImmediates, Lever::NoEquiangular, Lever::NoSeals];
+    pub const LEVERS: [Lever; 6] =
+        [Lever::All, Lever::NoPilot, Lever::NoSharing, Lever::NoImmediates, Lever::NoEquiangular, Lever::NoSeals];
 
     /// Its name in the results.
     pub fn name(self) -> &'static str {
         match self {
             Lever::All => "default",
             Lever::NoPilot => "no pilot",
+            Lever::NoSharing => "no sharing",
             Lever::NoImmediates => "all in the tree",
             Lever::NoEquiangular => "no equiangular",
             Lever::NoSeals => "no seals",
@@ -59,6 +62,7 @@ impl Lever {
     fn pull(self, packed: Packed) -> Option<Packed> {
         let useful = match self {
             Lever::All | Lever::NoPilot => true,
+            Lever::NoSharing => pilot::can_share_paths(&packed.features),
             Lever::NoImmediates => packed.immediate_count > 0,
             Lever::NoEquiangular => packed.features.equiangular,
             Lever::NoSeals => packed.features.sealed,
@@ -68,7 +72,7 @@ impl Lever {
             _ => packed,
         };
         match self {
-            Lever::All | Lever::NoPilot | Lever::NoImmediates => {}
+            Lever::All | Lever::NoPilot | Lever::NoSharing | Lever::NoImmediates => {}
             Lever::NoEquiangular => {
                 packed.media.iter_mut().for_each(|medium| medium.equiangular = 0.0);
                 packed.features.equiangular = false;
@@ -126,7 +130,7 @@ impl OurDevice {
         let Some(mut packed) = lever.pull(packed) else { return Ok(None) };
         let (begin, begin_cpu) = (Instant::now(), cpu_time());
         if lever != Lever::NoPilot {
-            pilot::run(&mut packed, true);
+            pilot::run(&mut packed, lever != Lever::NoSharing);
         }
         let pilot = Time { wall: begin.elapsed().as_secs_f64(), cpu: cpu_time() - begin_cpu };
         let mut backend = Renderer::new(&self.device, &packed).map_err(|cause| error(cause.to_string()))?;
