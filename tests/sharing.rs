@@ -95,8 +95,8 @@ fn differences(one: &[DVec3], two: &[DVec3]) -> ([f64; 3], f64) {
 fn sharing_changes_no_expectation() {
     for (index, (name, scene)) in cases(SIDE).into_iter().enumerate() {
         let sharers = [4, 8][index % 2];
-        let truth = tiles(&images::on_device(&pack(&scene, 4), 48));
-        let image = tiles(&images::on_device(&shared(&pack(&scene, 5), sharers), 48));
+        let truth = tiles(&images::on_device(&pack(&scene, 4), 24));
+        let image = tiles(&images::on_device(&shared(&pack(&scene, 5), sharers), 24));
         let (z, coarsest) = differences(&image, &truth);
         eprintln!("{name}, {sharers}: z = {z:.2?}, standard errors below {:.2} %", coarsest * 100.0);
         assert!(z.iter().all(|z| z.abs() < 4.0), "{name}: z = {z:?}");
