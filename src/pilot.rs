@@ -19,6 +19,7 @@
 use crate::pack::Packed;
 use crate::pack::features::Features;
 use crate::pack::layout::PILOT_CELLS;
+use crate::pack::lights::is_near;
 use crate::reference::bindings::Tables;
 use crate::reference::outlook::outlook_cell;
 use crate::reference::path::{arriving_throughput, path_answer_seen, path_start};
@@ -30,13 +31,16 @@ use rayon::prelude::*;
 /// Paths of each block, where only sharing is to be decided.
 const FEW_PATHS_PER_BLOCK: u32 = 4;
 /// The part of a render's variance before the second vertex is stratified so much better than that of the pilot.
-const OWN_STRATIFIED: f64 = 4.0;
+const DIRECT_STRATIFIED: f64 = 4.0;
 /// A group of M pixels has the variance of M to this power paths of one's own (measured: .65 to .76).
 const ALIKE_EXPONENT: f64 = 0.7;
 /// What keeping paths and summing up costs, in units of a path (measured: .25 to .35).
 const SHARE_COST: f64 = 0.35;
 /// A connection's ray takes this share of the time of a path's own ray, which has more to decide (measured: .4 to .5).
 const CONNECTION_COST: f64 = 0.45;
+
+/// Area of a broad lamp over the square of the scene's diameter.
+const BROAD_AREA: f32 = 2e-3;
 
 /// Films with fewer pixels are rendered before a pilot would be.
 const LEAST_PIXELS: usize = 4096;
@@ -80,8 +84,10 @@ struct Trail {
     block: usize,
     /// What came behind the first vertex.
     radiance: DVec3,
-    /// What came behind the second, where both can be shared.
-    shared: DVec3,
+    /// Of that, what came before the second.
+    direct: DVec3,
+    /// The first two vertices can be shared.
+    shares: bool,
     rays: f64,
     vertices: Vec<Vertex>,
 }
@@ -109,10 +115,34 @@ pub fn run(packed: &mut Packed, sharing: bool) {
     let features = &packed.features;
     let large = packed.pixel_count() >= LEAST_PIXELS && features.max_depth >= LEAST_MAX_DEPTH;
     // Without a tree rays are so cheap that shorter paths hardly pay for the noise of their ends.
-    let (sharing, roulette) = (sharing && can_share_paths(features), features.tree);
-    if !large || !(roulette || sharing) || packed.primitives.len() > MOST_PRIMITIVES {
-        return;
+    // Light that comes through glass comes in rare, bright paths, of which a pilot has seen too few.
+    let roulette = features.tree && !features.dielectric;
+    let equiangular = packed.media.iter().map(|medium| medium.equiangular).collect::<Vec<f32>>();
+    let broad = sharing && features.equiangular && has_broad_lamps_only(packed);
+    if broad {
+        set_equiangular(packed, &vec![0.0; equiangular.len()]);
     }
+    let sharing = sharing && can_share_paths(&packed.features);
+    if large && (roulette || sharing) && packed.primitives.len() <= MOST_PRIMITIVES {
+        look_ahead(packed, sharing, roulette);
+    }
+    if broad && packed.features.sharers == 0 {
+        set_equiangular(packed, &equiangular);
+    }
+}
+
+/// Whether all lamps are so broad that light does not come from near them alone. Sharing paths is worth more there than equiangular distances.
+fn has_broad_lamps_only(packed: &Packed) -> bool {
+    let least = BROAD_AREA * (2.0 * packed.frame.radius as f32).powi(2);
+    packed.lights.iter().filter(|light| is_near(light)).all(|light| light.area > least)
+}
+
+fn set_equiangular(packed: &mut Packed, shares: &[f32]) {
+    packed.media.iter_mut().zip(shares).for_each(|(medium, share)| medium.equiangular = *share);
+    packed.features.equiangular = shares.iter().any(|share| *share > 0.0);
+}
+
+fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
     let rounds = if roulette { PATHS_PER_BLOCK } else { FEW_PATHS_PER_BLOCK };
     let mut tables = Tables::new(packed);
     tables.params.seed = SEED;
@@ -180,14 +210,14 @@ fn follow_one(tables: &Tables, blocks: Blocks, block: u32, round: u32) -> Trail 
     }
     let after =
         |index: usize| vertices.get(index).map_or(DVec3::ZERO, |vertex: &Vertex| path.radiance - vertex.brought);
-    let (radiance, shared) = (after(0), if shares == 2 { after(1) } else { DVec3::ZERO });
+    let (radiance, direct) = (after(0), after(0) - after(1));
     for vertex in &mut vertices {
         let gained = (path.radiance - vertex.brought) / vertex.throughput;
         vertex.brought = DVec3::select(vertex.throughput.cmpgt(DVec3::splat(1e-9)), gained, DVec3::ZERO);
         vertex.rays = f64::from(rays) - vertex.rays;
     }
     vertices.retain(|vertex| vertex.brought.is_finite() && vertex.point.is_finite());
-    Trail { block: block as usize, radiance, shared, rays: f64::from(rays), vertices }
+    Trail { block: block as usize, radiance, direct, shares: shares == 2, rays: f64::from(rays), vertices }
 }
 
 /// What the trails say.
@@ -206,9 +236,10 @@ struct View {
     focus: Vec<DVec3>,
     /// Relative variance of a path.
     variance: f64,
-    /// The same of what comes before its second vertex, and behind it.
-    own: f64,
+    /// The same of what comes before its second vertex, and behind it where that can be shared and where it cannot.
+    direct: f64,
     shared: f64,
+    lonely: f64,
     /// Of a path.
     rays: f64,
     /// Time of a connection over that of a path.
@@ -242,17 +273,20 @@ impl View {
             };
             finite().map(relative).sum::<f64>() / count
         };
-        let (all, shared) = (variance(&|trail| trail.radiance), variance(&|trail| trail.shared));
-        let own = variance(&|trail| trail.radiance - trail.shared);
+        let (all, direct) = (variance(&|trail| trail.radiance), variance(&|trail| trail.direct));
+        let behind = |trail: &Trail, shares| {
+            if trail.shares == shares { trail.radiance - trail.direct } else { DVec3::ZERO }
+        };
+        let (shared, lonely) = (variance(&|trail| behind(trail, true)), variance(&|trail| behind(trail, false)));
         let rays = trails.iter().map(|trail| trail.rays).sum::<f64>() / trails.len() as f64;
         let known = floor > 0.0 && all > 0.0 && all.is_finite();
         let connection = CONNECTION_COST / rays;
-        known.then_some(View { focus, variance: all, own, shared, rays, connection })
+        known.then_some(View { focus, variance: all, direct, shared, lonely, rays, connection })
     }
 
     /// Variance with groups of so many pixels, as far as a render has it.
     fn variance_with(&self, sharers: u32) -> f64 {
-        self.own / OWN_STRATIFIED + self.shared / alike(sharers)
+        self.direct / DIRECT_STRATIFIED + self.lonely + self.shared / alike(sharers)
     }
 
     /// Pixels of the groups that bring the least variance times time.

@@ -62,7 +62,7 @@ impl Lever {
     fn pull(self, packed: Packed) -> Option<Packed> {
         let useful = match self {
             Lever::All | Lever::NoPilot => true,
-            Lever::NoSharing => pilot::can_share_paths(&packed.features),
+            Lever::NoSharing => pilot::can_share_paths(&packed.features) || packed.features.equiangular,
             Lever::NoImmediates => packed.immediate_count > 0,
             Lever::NoEquiangular => packed.features.equiangular,
             Lever::NoSeals => packed.features.sealed,
