@@ -119,7 +119,9 @@ fn features() -> Vec<Features> {
     let mut features: Vec<Features> = Vec::new();
     for (_, scene) in scenes::all() {
         let needed = scenes::pack(&scene, 1).features;
+        let sharing = [4, 8].map(|sharers| Features { sharers, grids: false, masks: false, ..needed });
         features.extend([needed, needed.everything(), Features { node_copies: 1, ..needed }]);
+        features.extend(sharing);
     }
     features
 }
@@ -132,11 +134,14 @@ fn kernels() -> Vec<ShaderSourceText> {
         workgroup: device().subgroup_size,
         buffer_reference: false,
     };
-    let mut kernels: Vec<ShaderSourceText> = features()
-        .into_iter()
-        .map(|features| expand("path_trace.comp", &variant(features)).expect("it expands"))
-        .collect();
-    let others = SOURCES.iter().filter(|(name, _)| name.ends_with(".comp") && *name != "path_trace.comp");
+    let of_scenes = ["path_trace.comp", "connect.comp", "share.comp"];
+    let mut kernels = Vec::new();
+    for features in features() {
+        // Without groups there is nothing to connect.
+        let needed = if features.sharers == 0 { &of_scenes[..1] } else { &of_scenes[..] };
+        kernels.extend(needed.iter().map(|name| expand(name, &variant(features)).expect("it expands")));
+    }
+    let others = SOURCES.iter().filter(|(name, _)| name.ends_with(".comp") && !of_scenes.contains(name));
     kernels.extend(others.map(|(name, _)| expand(name, &units::variant()).expect("it expands")));
     kernels
 }
