@@ -39,6 +39,9 @@ const SHARE_COST: f64 = 0.35;
 /// A connection's ray takes this share of the time of a path's own ray, which has more to decide (measured: .4 to .5).
 const CONNECTION_COST: f64 = 0.45;
 
+/// Pixels share their paths if the pilot promises at most this much of the variance times time without.
+const WORTH_SHARING: f64 = 0.8;
+
 /// Area of a broad lamp over the square of the scene's diameter.
 const BROAD_AREA: f32 = 2e-3;
 
@@ -289,14 +292,15 @@ impl View {
         self.direct / DIRECT_STRATIFIED + self.lonely + self.shared / alike(sharers)
     }
 
-    /// Pixels of the groups that bring the least variance times time.
+    /// Pixels of the groups that bring the least variance times time; 0 if that is hardly less than without.
     fn best_sharers(&self) -> u32 {
         let time = |sharers: u32| match sharers {
             0 => 1.0,
             _ => 1.0 + SHARE_COST + f64::from(sharers - 1) * self.connection,
         };
         let cost = |sharers: u32| self.variance_with(sharers) * time(sharers);
-        [0, 4, 8].into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(0)
+        let best = if cost(4) < cost(8) { 4 } else { 8 };
+        if cost(best) < WORTH_SHARING * cost(0) { best } else { 0 }
     }
 }
 
