@@ -39,6 +39,8 @@ const SHARE_COST: f64 = 0.35;
 /// A connection's ray takes this share of the time of a path's own ray, which has more to decide (measured: .4 to .5).
 const CONNECTION_COST: f64 = 0.45;
 
+/// Pixels of the largest groups.
+pub const MOST_SHARERS: u32 = 8;
 /// Pixels share their paths if the pilot promises at most this much of the variance times time without.
 const WORTH_SHARING: f64 = 0.8;
 
@@ -245,8 +247,6 @@ struct View {
     lonely: f64,
     /// Of a path.
     rays: f64,
-    /// Time of a connection over that of a path.
-    connection: f64,
 }
 
 impl View {
@@ -283,8 +283,12 @@ impl View {
         let (shared, lonely) = (variance(&|trail| behind(trail, true)), variance(&|trail| behind(trail, false)));
         let rays = trails.iter().map(|trail| trail.rays).sum::<f64>() / trails.len() as f64;
         let known = floor > 0.0 && all > 0.0 && all.is_finite();
-        let connection = CONNECTION_COST / rays;
-        known.then_some(View { focus, variance: all, direct, shared, lonely, rays, connection })
+        known.then_some(View { focus, variance: all, direct, shared, lonely, rays })
+    }
+
+    /// Time of the connections of a pixel over that of a path.
+    fn connections(&self, sharers: u32) -> f64 {
+        f64::from(sharers.max(1) - 1) * CONNECTION_COST / self.rays
     }
 
     /// Variance with groups of so many pixels, as far as a render has it.
@@ -296,10 +300,10 @@ impl View {
     fn best_sharers(&self) -> u32 {
         let time = |sharers: u32| match sharers {
             0 => 1.0,
-            _ => 1.0 + SHARE_COST + f64::from(sharers - 1) * self.connection,
+            _ => 1.0 + SHARE_COST + self.connections(sharers),
         };
         let cost = |sharers: u32| self.variance_with(sharers) * time(sharers);
-        let best = if cost(4) < cost(8) { 4 } else { 8 };
+        let best = if cost(4) < cost(MOST_SHARERS) { 4 } else { MOST_SHARERS };
         if cost(best) < WORTH_SHARING * cost(0) { best } else { 0 }
     }
 }
@@ -315,10 +319,7 @@ impl Found {
         // Where a group shares the rest of a path, its variance counts so much less; and a sample takes more rays.
         let (variance, rays) = match sharers {
             0 => (view.variance, view.rays),
-            _ => {
-                let time = view.rays * (1.0 + f64::from(sharers - 1) * view.connection);
-                (view.variance_with(sharers) * alike(sharers), time)
-            }
+            _ => (view.variance_with(sharers) * alike(sharers), view.rays * (1.0 + view.connections(sharers))),
         };
         let efficiency = STRATIFIED * rays / variance;
         let (origin, scale) = cells_of_space(trails)?;

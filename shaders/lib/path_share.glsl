@@ -17,11 +17,10 @@ const uint END_NONE = 0u;
 const uint END_SURFACE = 1u;
 const uint END_MEDIUM = 2u;
 
-// Vectors of a record: the first vertex in two, what its rays need, its weight; and then from here on:
+// The RECORD_VECTORS of a record: the first vertex in two, what its rays need, its weight; and then from here on:
 const uint SECOND = 4u; // the second vertex
 const uint SENT = 6u;   // what it sends: see Sent
 const uint BASE = 11u;  // radiance that came before it
-const uint RECORD = 12u;
 
 const uint SHARE_COLUMNS = 2u;
 const uint SHARE_ROWS = SHARERS == 4u ? 2u : 4u;
@@ -61,7 +60,7 @@ uint sharer_number(uvec2 pixel) {
 }
 
 uint record_of(uint slot) {
-    return push.work.first_record + RECORD * slot;
+    return push.work.first_record + RECORD_VECTORS * slot;
 }
 
 // Where the densities of a group's connections begin. `number` is that of the group, times samples.

@@ -5,7 +5,7 @@ use super::kernel::Kernel;
 use super::shader::{Variant, compile_cached, expand};
 use super::{Device, Error};
 use crate::pack::Packed;
-use crate::pack::layout::{Dispatch, TILE};
+use crate::pack::layout::{Dispatch, RECORD_VECTORS, TILE};
 use crate::pack::sobol;
 use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo};
 use std::ops::Range;
@@ -13,8 +13,6 @@ use std::sync::Arc;
 
 /// Most vectors of four numbers, of 16 bytes, for samples in flight: one each, and more where pixels share paths.
 const MAX_VECTORS: usize = 1 << 23;
-/// Vectors of the record of a path: RECORD in `lib/path_share.glsl`.
-const RECORD_VECTORS: usize = 12;
 /// Bindings of the path tracer; the first [`ADDRESSES`] can also be read by address.
 const BINDINGS: u32 = 13;
 const ADDRESSES: usize = 12;
@@ -36,8 +34,6 @@ pub struct Renderer {
     sums: Buffer,
     invalid: Buffer,
     crop: [u32; 2],
-    /// Pixels of a group; 0 where they share nothing.
-    sharers: u32,
     /// Samples that `samples` holds.
     capacity: usize,
 }
@@ -46,6 +42,8 @@ pub struct Renderer {
 struct Sharing {
     connect: Kernel,
     share: Kernel,
+    /// Pixels of a group.
+    sharers: u32,
 }
 
 impl Renderer {
@@ -63,16 +61,16 @@ impl Renderer {
     /// The same with a kernel that can do more than the scene needs, or in another form.
     pub fn with_variant(device: &Arc<Device>, packed: &Packed, variant: &Variant) -> Result<Renderer, Error> {
         let push_size = ADDRESS_BYTES + size_of::<Dispatch>();
-        let code = compile_cached(&expand("path_trace.comp", variant)?)?;
-        let path_trace = Kernel::new(device, &code, BINDINGS, push_size as u32)?;
         let kernel = |name: &str| -> Result<Kernel, Error> {
             Kernel::new(device, &compile_cached(&expand(name, variant)?)?, BINDINGS, push_size as u32)
         };
-        let sharers = variant.features.sharers as usize;
+        let path_trace = kernel("path_trace.comp")?;
+        let sharers = variant.features.sharers;
         let sharing = match sharers {
             0 => None,
-            _ => Some(Sharing { connect: kernel("connect.comp")?, share: kernel("share.comp")? }),
+            _ => Some(Sharing { connect: kernel("connect.comp")?, share: kernel("share.comp")?, sharers }),
         };
+        let sharers = sharers as usize;
         let code = compile_cached(&expand("resolve.comp", variant)?)?;
         let resolve = Kernel::new(device, &code, 4, size_of::<Dispatch>() as u32)?;
         let tables = [
@@ -109,7 +107,6 @@ impl Renderer {
             sums: Buffer::zeroed::<[f32; 4]>(device, "sums", sums_length(pixels, capacity))?,
             invalid: Buffer::zeroed::<[u32; 4]>(device, "invalid", capacity / TILE_PIXELS)?,
             crop,
-            sharers: variant.features.sharers,
             capacity,
         })
     }
@@ -137,7 +134,7 @@ impl Renderer {
             tile_count,
             tile_step: coprime_step(tile_count),
             first_record: self.capacity as u32,
-            first_pair: (self.capacity * (1 + RECORD_VECTORS)) as u32,
+            first_pair: (self.capacity * (1 + RECORD_VECTORS as usize)) as u32,
             ..Dispatch::default()
         };
         let buffers: Vec<&Buffer> = self.tables.iter().chain([&self.samples, &self.params]).collect();
@@ -149,9 +146,9 @@ impl Renderer {
         }
         let push = [bytemuck::cast_slice(&addresses), bytemuck::bytes_of(&work)].concat();
         self.path_trace.dispatch(&buffers, &push, tile_count)?;
-        if let Some(Sharing { connect, share }) = &mut self.sharing {
+        if let Some(Sharing { connect, share, sharers }) = &mut self.sharing {
             connect.dispatch(&buffers, &push, tile_count)?;
-            let groups = tile_count * TILE * TILE / self.sharers * work.sample_count;
+            let groups = tile_count * TILE * TILE / *sharers * work.sample_count;
             share.dispatch(&buffers, &push, groups.div_ceil(self.device.subgroup_size))?;
         }
 
@@ -240,7 +237,7 @@ fn capacity(pixels: usize, sharers: usize, most: u64) -> usize {
 
 /// Vectors of four numbers that a sample takes.
 fn vectors_of_sample(sharers: usize) -> usize {
-    if sharers == 0 { 1 } else { 1 + RECORD_VECTORS + sharers }
+    if sharers == 0 { 1 } else { 1 + RECORD_VECTORS as usize + sharers }
 }
 
 /// Sums and sums of squares of the blocks in flight.

@@ -550,6 +550,8 @@ pub const MEDIUM_EMISSION_GRID: u32 = 1 << 27;
 pub const MEDIUM_SEALED: u32 = 1 << 28;
 /// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
 pub const TILE: u32 = 8;
+/// Vectors of four numbers in the record of a path that pixels share: see `lib/path_share.glsl`.
+pub const RECORD_VECTORS: u32 = 12;
 /// Longest distance; rays that end nowhere end here.
 pub const INFINITE_DISTANCE: f32 = 1e30;
 
@@ -621,6 +623,7 @@ pub fn glsl() -> String {
         ("MEDIUM_ALBEDO_GRID", MEDIUM_ALBEDO_GRID),
         ("MEDIUM_EMISSION_GRID", MEDIUM_EMISSION_GRID),
         ("TILE", TILE),
+        ("RECORD_VECTORS", RECORD_VECTORS),
         ("BLOCK_SAMPLES", crate::render::BLOCK_SAMPLES),
         ("POINT_BITS", sobol::POINT_BITS),
         ("POINT_COUNT", sobol::POINT_COUNT),
