@@ -4,18 +4,8 @@
 mod common;
 
 use common::images::{Image, average, by_reference, on_device};
-use common::scenes::pack;
+use common::scenes::{from_file, pack};
 use glam::DVec3;
-use std::path::Path;
-use tyndall::scene::{Scene, mitsuba};
-
-fn load(name: &str, parameters: &[(&str, &str)]) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mitsuba").join(name);
-    let parameters: Vec<(String, String)> = parameters.iter().map(|&(a, b)| (a.to_owned(), b.to_owned())).collect();
-    let loaded = mitsuba::load(&path, &parameters).expect("the scene is good");
-    assert_eq!(loaded.warnings, [""; 0], "{name}");
-    loaded.scene
-}
 
 /// The largest difference of a channel, beyond `relative` of what is expected.
 fn excess(image: &Image, expected: &[[f64; 3]], relative: f64) -> f64 {
@@ -69,7 +59,7 @@ const SLIDES: [[f64; 3]; 54] = [
 #[test]
 fn light_passes_panes_without_an_event() {
     for (parameters, expected) in [(&[][..], &BUBBLE), (&[("factor", "0.6"), ("depth", "3")][..], &DIM_BUBBLE)] {
-        let packed = pack(&load("panes.xml", parameters), 5);
+        let packed = pack(&from_file("panes.xml", parameters), 5);
         assert!(packed.features.panes);
         let device = on_device(&packed, 16384);
         // Standard errors of Mitsuba's pixels are up to 0.0024, where the lamp is seen as a reflection.
@@ -77,7 +67,7 @@ fn light_passes_panes_without_an_event() {
         assert!(far < 6e-3, "{parameters:?}: {far}");
         // The planted faults: another brightness, and a path of one event less.
         assert!(excess(&device, &brighter(expected, 1.08), 0.02) > 6e-3);
-        let mut short = load("panes.xml", parameters);
+        let mut short = from_file("panes.xml", parameters);
         short.integrator.max_depth = short.integrator.max_depth.map(|depth| depth - 1);
         assert!(excess(&on_device(&pack(&short, 5), 1024), expected, 0.02) > 6e-3, "{parameters:?}");
         let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
@@ -88,7 +78,7 @@ fn light_passes_panes_without_an_event() {
 
 #[test]
 fn pictures_in_front_of_lamps_and_colours_of_meshes() {
-    let scene = load("slides.xml", &[]);
+    let scene = from_file("slides.xml", &[]);
     let packed = pack(&scene, 5);
     assert!(packed.features.slides);
     let device = on_device(&packed, 16384);

@@ -4,22 +4,12 @@
 mod common;
 
 use common::images::{Image, average, by_reference, mean, on_device, with_variant};
-use common::scenes::pack;
+use common::scenes::{from_file, pack};
 use glam::DVec3;
-use std::path::Path;
 use tyndall::gpu::shader::Variant;
 use tyndall::pack::{PackError, Packed};
 use tyndall::render::{aov, picture};
-use tyndall::scene::{Colors, Film, Geometry, Lens, Light, Medium, Phase, ReconstructionFilter, Scene, Shape, mitsuba};
-
-/// A scene of `tests/data/mitsuba` with parameters.
-fn load(name: &str, parameters: &[(&str, &str)]) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mitsuba").join(name);
-    let parameters: Vec<(String, String)> = parameters.iter().map(|&(a, b)| (a.to_owned(), b.to_owned())).collect();
-    let loaded = mitsuba::load(&path, &parameters).expect("the scene is good");
-    assert_eq!(loaded.warnings, [""; 0], "{name}");
-    loaded.scene
-}
+use tyndall::scene::{Colors, Film, Geometry, Lens, Light, Medium, Phase, ReconstructionFilter, Shape};
 
 /// The pixel whose green value is farthest from what is expected, if it is farther than a tolerance.
 fn farthest(image: &Image, expected: &[f64], tolerance: f64) -> Option<String> {
@@ -94,7 +84,7 @@ const EDGES: [(&str, &str, [f64; 20]); 7] = [
 #[test]
 fn reconstruction_filters_have_the_expected_pixels_of_mitsuba() {
     for (filter, border, expected) in EDGES {
-        let image = on_device(&pack(&load("edge.xml", &[("filter", filter), ("border", border)]), 3), 8192);
+        let image = on_device(&pack(&from_file("edge.xml", &[("filter", filter), ("border", border)]), 3), 8192);
         // Weights of both signs make noise.
         let tolerance = if ["mitchell", "catmullrom", "lanczos"].contains(&filter) { 1.5e-2 } else { 6e-3 };
         assert_eq!(farthest(&image, &expected, tolerance), None, "{filter}, sample_border {border}");
@@ -106,7 +96,7 @@ fn reconstruction_filters_have_the_expected_pixels_of_mitsuba() {
 
 #[test]
 fn a_constant_picture_stays_constant_up_to_the_borders() {
-    let mut scene = load("edge.xml", &[]);
+    let mut scene = from_file("edge.xml", &[]);
     scene.shapes.clear();
     scene.lights.push(Light::Constant { radiance: glam::DVec3::ONE });
     for filter in [
@@ -128,7 +118,7 @@ fn a_constant_picture_stays_constant_up_to_the_borders() {
 #[test]
 fn device_and_reference_draw_the_same_places() {
     for (filter, border, _) in EDGES {
-        let packed = pack(&load("edge.xml", &[("filter", filter), ("border", border)]), 3);
+        let packed = pack(&from_file("edge.xml", &[("filter", filter), ("border", border)]), 3);
         assert_eq!(packed.features.filter, filter != "box");
         let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
         // A sample at the very edge of the lamp may fall on either side of it: 2/64 times a weight.
@@ -143,10 +133,10 @@ fn device_and_reference_draw_the_same_places() {
 
 #[test]
 fn a_box_of_one_pixel_costs_nothing_and_is_the_filter_of_the_general_kernel() {
-    let packed = pack(&load("edge.xml", &[("filter", "box")]), 3);
+    let packed = pack(&from_file("edge.xml", &[("filter", "box")]), 3);
     assert!(!packed.features.filter && packed.values.is_empty() && packed.params.filter_cells == 0);
     // The same picture by the general way, with a box that is a hair wider.
-    let mut scene = load("edge.xml", &[("filter", "box")]);
+    let mut scene = from_file("edge.xml", &[("filter", "box")]);
     scene.film.filter = ReconstructionFilter::Box { radius: 0.5000001 };
     let general = pack(&scene, 3);
     assert!(general.features.filter);
@@ -188,7 +178,7 @@ const CAMERAS: [(&str, [f64; 24]); 3] = [
 #[test]
 fn cameras_have_the_expected_pixels_of_mitsuba() {
     for (name, expected) in CAMERAS {
-        let packed = pack(&load("sensors.xml", &[("camera", name)]), 3);
+        let packed = pack(&from_file("sensors.xml", &[("camera", name)]), 3);
         assert_eq!((packed.features.lens, packed.features.orthographic), (name == "thinlens", name == "orthographic"));
         // Four dimensions make more noise than two.
         let (spp, tolerance) = if packed.features.lens { (32_768, 1e-2) } else { (8192, 6e-3) };
@@ -202,7 +192,7 @@ fn cameras_have_the_expected_pixels_of_mitsuba() {
 
 #[test]
 fn a_lens_without_width_is_a_pinhole() {
-    let scene = load("sensors.xml", &[("camera", "thinlens")]);
+    let scene = from_file("sensors.xml", &[("camera", "thinlens")]);
     let mut narrow = scene.clone();
     narrow.camera.lens = Lens::Thin { aperture_radius: 1e-9, focus_distance: 5.5 };
     let mut pinhole = scene.clone();
@@ -218,7 +208,7 @@ fn a_lens_without_width_is_a_pinhole() {
 
 #[test]
 fn rays_that_would_begin_in_different_media_are_refused() {
-    let mut scene = load("sensors.xml", &[("camera", "orthographic")]);
+    let mut scene = from_file("sensors.xml", &[("camera", "orthographic")]);
     let fog = scene.add_medium(Medium::new("fog", DVec3::ONE, DVec3::ONE, Phase::HenyeyGreenstein { g: 0.0 }));
     let eye = scene.camera.to_world.w_axis.truncate();
     let forward = scene.camera.to_world.z_axis.truncate();
@@ -334,7 +324,7 @@ const CHANNELS: [(&str, [f64; 24]); 11] = [
 
 #[test]
 fn channels_are_those_of_mitsuba() {
-    let mut scene = load("channels.xml", &[]);
+    let mut scene = from_file("channels.xml", &[]);
     let packed = pack(&scene, 3);
     let channels = aov::render(&packed, &scene.aovs, true, 4096);
     let names: Vec<&str> = channels.iter().map(|(name, _)| name.as_str()).collect();
@@ -429,7 +419,7 @@ const SURFACES: [(&str, [f64; 24]); 6] = [
 #[test]
 fn surfaces_have_the_expected_pixels_of_mitsuba() {
     for (name, expected) in SURFACES {
-        let packed = pack(&load("surfaces.xml", &[("material", name)]), 3);
+        let packed = pack(&from_file("surfaces.xml", &[("material", name)]), 3);
         assert_eq!(packed.features.blends, ["blend", "sides", "several"].contains(&name));
         assert_eq!(packed.features.reliefs, ["normals", "bumps", "turns", "several"].contains(&name));
         let image = on_device(&packed, 2048);

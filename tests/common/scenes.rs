@@ -457,3 +457,12 @@ pub fn through_ball(medium: Medium, diameter: f64, distance: f64) -> Scene {
     scene.shapes.push(Shape::boundary("ball", ball(DVec3::ZERO, diameter / 2.0), medium));
     scene
 }
+
+/// A scene of `tests/data/mitsuba` with parameters.
+pub fn from_file(name: &str, parameters: &[(&str, &str)]) -> Scene {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mitsuba").join(name);
+    let parameters: Vec<(String, String)> = parameters.iter().map(|&(a, b)| (a.to_owned(), b.to_owned())).collect();
+    let loaded = tyndall::scene::mitsuba::load(&path, &parameters).expect("the scene is good");
+    assert_eq!(loaded.warnings, [""; 0], "{name}");
+    loaded.scene
+}
