@@ -20,10 +20,11 @@ void main() {
     uint count = push.work.sample_count, samples_in_tile = TILE * TILE * count;
     uint first_slot = gl_WorkGroupID.x * samples_in_tile;
     uvec2 size = uvec2(params.crop_width, params.crop_height);
-    uvec2 corner = tile_pixel(push.work.first_tile + gl_WorkGroupID.x, 0u, params.crop_width);
+    uvec2 corner = tile_pixel(push.work.first_tile + gl_WorkGroupID.x, 0u, params.crop_width + group_margin(SHARERS).x);
     // The sample whose first vertex is connected, and the number of the next pixel of its group.
     uint slot = gl_LocalInvocationIndex, of_pixel = 0u, next = 0u, own = 0u, pairs = 0u, to = 0u;
-    uvec2 pixel = uvec2(0u);
+    // Its place in the tile, and the pixel of the tile's first place.
+    uvec2 place = uvec2(0u), origin = uvec2(0u);
     End first, second;
     vec3 weight = vec3(0.0);
     float density = 0.0;
@@ -54,26 +55,25 @@ void main() {
             }
             if (next == 0u) {
                 uint in_tile = quotient(slot, count), record = record_of(first_slot + slot);
-                uvec2 place = uvec2(in_tile % TILE, in_tile / TILE);
+                place = uvec2(in_tile % TILE, in_tile / TILE);
                 of_pixel = slot - in_tile * count;
-                pixel = corner + place;
+                origin = corner - group_offset(SHARERS, push.work.first_sample + of_pixel);
                 own = sharer_number(place);
                 pairs = pairs_of(gl_WorkGroupID.x * (samples_in_tile / SHARERS) + group_in_tile(place) * count + of_pixel);
                 first = load_end(record);
-                first.kind = all(lessThan(pixel, size)) ? first.kind : END_NONE;
+                first.kind = all(lessThan(origin + place, size)) ? first.kind : END_NONE;
                 vec4 left = SAMPLE(record + 2u);
                 path.left = uint(left.x) | uint(left.y) << 16u;
                 if (HAS_CHROMATIC) {
-                    weight = SAMPLE(record + 3u).xyz;
+                    weight = SAMPLE(record + RECORD_WEIGHT).xyz;
                 }
             }
             to = next;
             next += 1u;
             asked = false;
-            uvec2 other = sharer_pixel(pixel, to);
-            if (first.kind != END_NONE && all(lessThan(other, size))) {
-                uvec2 place = other - corner;
-                uint record = record_of(first_slot + (place.y * TILE + place.x) * count + of_pixel);
+            uvec2 other = sharer_place(place, to);
+            if (first.kind != END_NONE && all(lessThan(origin + other, size))) {
+                uint record = record_of(first_slot + (other.y * TILE + other.x) * count + of_pixel);
                 second = load_end(record + SECOND);
                 asked = second.kind != END_NONE && begin_connection(path, first, second, density);
                 if (asked) {

@@ -15,6 +15,13 @@ layout(local_size_x = WORKGROUP) in;
 
 shared uint next_sample;
 
+// The pixel, and the sample's index, of a slot of the tile with this corner. Beyond the left and the upper edge it is a large number.
+uvec2 pixel_of(uint slot, uvec2 corner, uint count, out uint sample_index) {
+    uint in_tile = quotient(slot, count);
+    sample_index = push.work.first_sample + slot - in_tile * count;
+    return corner + uvec2(in_tile % TILE, in_tile / TILE) - group_offset(SHARERS, sample_index);
+}
+
 void main() {
     if (gl_LocalInvocationIndex == 0u) {
         next_sample = WORKGROUP;
@@ -23,7 +30,7 @@ void main() {
     // Neighbouring tiles cost alike: a step coprime to their number spreads them over the processors.
     uint turn = (gl_WorkGroupID.x * push.work.tile_step) % push.work.tile_count;
     uint tile = push.work.first_tile + turn;
-    uvec2 corner = tile_pixel(tile, 0u, params.crop_width);
+    uvec2 corner = tile_pixel(tile, 0u, params.crop_width + group_margin(SHARERS).x);
     uint count = push.work.sample_count, samples_in_tile = TILE * TILE * count;
     uint slot = gl_LocalInvocationIndex;
 
@@ -52,17 +59,14 @@ void main() {
                 }
                 fresh = false;
                 // Pixels beyond the crop window's edge have no samples.
-                uint in_tile = quotient(slot, count);
-                uvec2 pixel = corner + uvec2(in_tile % TILE, in_tile / TILE);
+                uvec2 pixel = pixel_of(slot, corner, count, path.sample_index);
                 while (slot < samples_in_tile && (pixel.x >= params.crop_width || pixel.y >= params.crop_height)) {
                     slot = atomicAdd(next_sample, 1u);
-                    in_tile = quotient(slot, count);
-                    pixel = corner + uvec2(in_tile % TILE, in_tile / TILE);
+                    pixel = pixel_of(slot, corner, count, path.sample_index);
                 }
                 if (slot >= samples_in_tile) {
                     break;
                 }
-                path.sample_index = push.work.first_sample + slot - in_tile * count;
                 if (HAS_SHARING) {
                     path.slot = turn * samples_in_tile + slot;
                     share_nothing(path.slot);

@@ -1,4 +1,4 @@
-// Sums the samples of each pixel, block by block and in order, so that the sums do not depend on who rendered a sample or when.
+// Sums the samples of each pixel, block by block, or run by run, and in order, so that the sums do not depend on who rendered a sample or when.
 #version 460
 #include "lib/layout.glsl"
 #include "lib/features.glsl"
@@ -7,7 +7,7 @@
 layout(local_size_x = WORKGROUP) in;
 
 layout(set = 0, binding = 0, std430) readonly buffer Samples { vec4 samples[]; };
-// For each block and pixel of the dispatch: the sum and, behind it, the sum of squares.
+// For each block, or run where pixels share paths, and each place of the dispatch: the sum, the sum of squares, and the sum of what was shared.
 layout(set = 0, binding = 1, std430) buffer Sums { vec4 sums[]; };
 // For each block: samples that are NaN, infinite, negative; one unused.
 layout(set = 0, binding = 2, std430) buffer Invalid { uint invalid[]; };
@@ -19,25 +19,33 @@ bool is_nan(float x) { return (floatBitsToUint(x) & 0x7fffffffu) > 0x7f800000u; 
 bool is_infinite(float x) { return (floatBitsToUint(x) & 0x7fffffffu) == 0x7f800000u; }
 bool is_negative(float x) { return floatBitsToUint(x) > 0x80000000u; }
 
+// Samples in a sum, and vectors of a sum.
+const uint SUM_SAMPLES = HAS_SHARING ? RUN_SAMPLES : BLOCK_SAMPLES;
+const uint SUM_VECTORS = HAS_SHARING ? 3u : 2u;
+
 void main() {
-    uint pixel = gl_GlobalInvocationID.x;
-    uint pixel_count = push.work.tile_count * TILE * TILE;
-    if (pixel >= pixel_count) {
+    uint place = gl_GlobalInvocationID.x;
+    uint place_count = push.work.tile_count * TILE * TILE;
+    if (place >= place_count) {
         return;
     }
-    uvec2 place = tile_pixel(push.work.first_tile + pixel / (TILE * TILE), pixel % (TILE * TILE), params.crop_width);
-    if (place.x >= params.crop_width || place.y >= params.crop_height) {
-        return; // The tile reaches over the crop window's edge: nobody rendered this pixel.
-    }
-    uint first = pixel * push.work.sample_count;
-    for (uint start = 0u; start < push.work.sample_count; start += BLOCK_SAMPLES) {
+    uvec2 unshifted = tile_pixel(push.work.first_tile + place / (TILE * TILE), place % (TILE * TILE), params.crop_width + group_margin(SHARERS).x);
+    uint first = place * push.work.sample_count;
+    for (uint start = 0u; start < push.work.sample_count; start += SUM_SAMPLES) {
+        uvec2 pixel = unshifted - group_offset(SHARERS, push.work.first_sample + start);
+        if (pixel.x >= params.crop_width || pixel.y >= params.crop_height) {
+            continue; // The tile reaches over the crop window's edge: nobody rendered this pixel.
+        }
         uint block = start / BLOCK_SAMPLES;
-        vec3 sum = vec3(0.0), squares = vec3(0.0);
-        for (uint k = start; k < min(start + BLOCK_SAMPLES, push.work.sample_count); ++k) {
+        vec3 sum = vec3(0.0), squares = vec3(0.0), brought = vec3(0.0);
+        for (uint k = start; k < min(start + SUM_SAMPLES, push.work.sample_count); ++k) {
             vec4 weighted = samples[first + k];
             vec3 value = weighted.xyz;
             sum += value;
             squares += value * value;
+            if (HAS_SHARING) {
+                brought += samples[push.work.first_record + RECORD_VECTORS * (first + k) + RECORD_WEIGHT].xyz;
+            }
             // In a negative lobe of the filter, what is positive is negative here.
             value = weighted.w < 0.0 ? -value : value;
             if (is_nan(value.x) || is_nan(value.y) || is_nan(value.z)) {
@@ -48,8 +56,11 @@ void main() {
                 atomicAdd(invalid[4u * block + 2u], 1u);
             }
         }
-        uint slot = 2u * (block * pixel_count + pixel);
+        uint slot = SUM_VECTORS * (start / SUM_SAMPLES * place_count + place);
         sums[slot] = vec4(sum, 0.0);
         sums[slot + 1u] = vec4(squares, 0.0);
+        if (HAS_SHARING) {
+            sums[slot + 2u] = vec4(brought, 0.0);
+        }
     }
 }

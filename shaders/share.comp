@@ -19,7 +19,8 @@ void main() {
     }
     uint turn = number / (groups_in_tile * count), in_turn = number - turn * groups_in_tile * count;
     uint group = quotient(in_turn, count), of_pixel = in_turn - group * count;
-    uvec2 corner = tile_pixel(push.work.first_tile + turn, 0u, params.crop_width), place = group_pixel(group);
+    uvec2 place = group_place(group), corner = tile_pixel(push.work.first_tile + turn, 0u, params.crop_width + group_margin(SHARERS).x)
+        - group_offset(SHARERS, push.work.first_sample + of_pixel);
     uvec2 size = uvec2(params.crop_width, params.crop_height);
     uint pairs = pairs_of(number);
     // Of each pixel of the group: its slot, whether it has a first vertex, that vertex, and the sum.
@@ -27,10 +28,10 @@ void main() {
     bool finds[SHARERS];
     vec3 points[SHARERS], sums[SHARERS];
     for (uint i = 0u; i < SHARERS; ++i) {
-        uvec2 pixel = sharer_pixel(place, i);
-        slots[i] = (turn * TILE * TILE + pixel.y * TILE + pixel.x) * count + of_pixel;
+        uvec2 own = sharer_place(place, i);
+        slots[i] = (turn * TILE * TILE + own.y * TILE + own.x) * count + of_pixel;
         vec4 first = vec4(0.0);
-        if (all(lessThan(corner + pixel, size))) {
+        if (all(lessThan(corner + own, size))) {
             first = SAMPLE(record_of(slots[i]));
         }
         finds[i] = first.w > 0.0;
@@ -49,8 +50,7 @@ void main() {
             of_place += densities[k].w;
         }
         if (of_place > 0.0) {
-            uvec2 pixel = sharer_pixel(place, j);
-            uint record = record_of((turn * TILE * TILE + pixel.y * TILE + pixel.x) * count + of_pixel);
+            uint record = record_of(slots[j]);
             Sent sent = load_sent(record);
             if (HAS_HENYEY_GREENSTEIN) {
                 End second = load_end(record + SECOND);
@@ -82,14 +82,15 @@ void main() {
         }
     }
     for (uint i = 0u; i < SHARERS; ++i) {
+        uint record = record_of(slots[i]);
+        vec3 brought = vec3(0.0);
         if (finds[i]) {
-            uint record = record_of(slots[i]);
-            vec3 value = SAMPLE(record + 3u).xyz * sums[i];
-            if (SAMPLE(record + SECOND).w > 0.0) {
-                value += SAMPLE(record + BASE).xyz;
-            }
             vec4 found = SAMPLE(slots[i]);
-            SAMPLE(slots[i]) = vec4(found.xyz + (HAS_FILTER ? value * found.w : value), found.w);
+            float filter_weight = HAS_FILTER ? found.w : 1.0;
+            brought = SAMPLE(record + RECORD_WEIGHT).xyz * sums[i] * filter_weight;
+            vec3 base = SAMPLE(record + SECOND).w > 0.0 ? SAMPLE(record + BASE).xyz * filter_weight : vec3(0.0);
+            SAMPLE(slots[i]) = vec4(found.xyz + (brought + base), found.w);
         }
+        store_sample(record + RECORD_WEIGHT, vec4(brought, 0.0));
     }
 }

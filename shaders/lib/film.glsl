@@ -10,3 +10,15 @@ uvec2 tile_pixel(uint tile, uint pixel, uint crop_width) {
 uint quotient(uint a, uint b) {
     return uint((float(a) + 0.5) / float(b));
 }
+
+// Where pixels share paths, columns and rows of their groups are shifted by these for a sample: all groups meet all their neighbours in
+// turn. No shift without sharing (sharers = 0).
+uvec2 group_offset(uint sharers, uint sample_index) {
+    uint k = sample_index / (2u * RUN_SAMPLES) % RUN_SHIFTS, x = k & 1u, y = k >> 1u;
+    return sharers == 0u ? uvec2(0u) : sharers == 4u ? uvec2(x, x ^ y) : uvec2(x, 2u * x + y);
+}
+
+// The largest shift.
+uvec2 group_margin(uint sharers) {
+    return sharers == 0u ? uvec2(0u) : sharers == 4u ? uvec2(1u) : uvec2(1u, 3u);
+}

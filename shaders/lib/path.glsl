@@ -48,7 +48,11 @@ vec2 filtered_place(inout Path path, vec2 center, vec2 u) {
 void path_start(inout Path path, uvec2 pixel) {
     uint row = pixel.y + params.crop_y, column = pixel.x + params.crop_x;
     path.pixel = row * params.film_width + column;
-    vec4 u = sample_set(path, 0u);
+    if (HAS_SHARING) {
+        uvec2 group = (pixel + group_offset(SHARERS, path.sample_index)) / SHARE_SIZE;
+        path.group = group.y * params.film_width + group.x;
+    }
+    vec4 u = sample_camera(path);
     vec2 place = vec2(column, row) + u.xy;
     path.filter_weight = 1.0;
     if (HAS_FILTER && params.filter_cells > 0u) {

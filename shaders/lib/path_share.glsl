@@ -8,6 +8,9 @@
 // where p_k is the density with which the first vertex of k finds it, visibility and flight through the medium with it, so that no weight
 // exceeds 1 and no singularity is left. Only vertices that scatter in a way which is known without their place on a surface take part:
 // diffuse surfaces and media. All else is left to its own pixel.
+//
+// The groups are shifted from run to run of samples (lib/film.glsl), so that the noise that the pixels of a group have in common can be
+// told from the image afterwards (src/render/reconstruct.rs), which needs the shared part of each sample by itself.
 #include "lib/path_state.glsl"
 #include "lib/path_vertex.glsl"
 #include "lib/path_rays.glsl"
@@ -22,10 +25,7 @@ const uint SECOND = 4u; // the second vertex
 const uint SENT = 6u;   // what it sends: see Sent
 const uint BASE = 11u;  // radiance that came before it
 
-const uint SHARE_COLUMNS = 2u;
-const uint SHARE_ROWS = SHARERS == 4u ? 2u : 4u;
-// Pixels of a group are this far apart, so that their common noise does not show as blocks.
-const uint SHARE_STEP = 2u;
+const uvec2 SHARE_SIZE = uvec2(2u, SHARERS == 4u ? 2u : 4u);
 
 // Rays end this many times the offset of rays that leave a surface before it.
 const float END_MARGIN = 4.0;
@@ -48,15 +48,14 @@ struct Sent {
     vec3 rest_direction;
 };
 
-// The pixel of number n in the group of a pixel, and its own number.
-uvec2 sharer_pixel(uvec2 pixel, uint n) {
-    uvec2 size = SHARE_STEP * uvec2(SHARE_COLUMNS, SHARE_ROWS);
-    return pixel / size * size + pixel % SHARE_STEP + SHARE_STEP * uvec2(n % SHARE_COLUMNS, n / SHARE_COLUMNS);
+// The place in a tile of number n in the group of a place, and its own number.
+uvec2 sharer_place(uvec2 place, uint n) {
+    return place / SHARE_SIZE * SHARE_SIZE + uvec2(n % SHARE_SIZE.x, n / SHARE_SIZE.x);
 }
 
-uint sharer_number(uvec2 pixel) {
-    uvec2 place = pixel % (SHARE_STEP * uvec2(SHARE_COLUMNS, SHARE_ROWS)) / SHARE_STEP;
-    return place.y * SHARE_COLUMNS + place.x;
+uint sharer_number(uvec2 place) {
+    place %= SHARE_SIZE;
+    return place.y * SHARE_SIZE.x + place.x;
 }
 
 uint record_of(uint slot) {
@@ -77,17 +76,14 @@ void store_pair(uint pairs, uint i, uint j, vec4 density) {
     }
 }
 
-// Number of the group of a pixel among those of a tile.
-uint group_in_tile(uvec2 in_tile) {
-    uvec2 size = SHARE_STEP * uvec2(SHARE_COLUMNS, SHARE_ROWS), block = in_tile / size, place = in_tile % SHARE_STEP;
-    return ((block.y * (TILE / size.x) + block.x) * SHARE_STEP + place.y) * SHARE_STEP + place.x;
+// Number of the group of a place among those of a tile, and its first place.
+uint group_in_tile(uvec2 place) {
+    place /= SHARE_SIZE;
+    return place.y * (TILE / SHARE_SIZE.x) + place.x;
 }
 
-// The first pixel of a group.
-uvec2 group_pixel(uint group) {
-    uvec2 size = SHARE_STEP * uvec2(SHARE_COLUMNS, SHARE_ROWS);
-    uint block = group / (SHARE_STEP * SHARE_STEP);
-    return uvec2(block % (TILE / size.x), block / (TILE / size.x)) * size + uvec2(group % SHARE_STEP, group / SHARE_STEP % SHARE_STEP);
+uvec2 group_place(uint group) {
+    return uvec2(group % (TILE / SHARE_SIZE.x), group / (TILE / SHARE_SIZE.x)) * SHARE_SIZE;
 }
 
 void store_end(uint at, Path path, Vertex vertex) {
@@ -124,7 +120,7 @@ void share_vertex(inout Path path, inout Vertex vertex) {
         if (max_component(weight) > 0.0) {
             store_end(record, path, vertex);
             store_sample(record + 2u, vec4(float(path.left & 0xffffu), float(path.left >> 16u), 0.0, 0.0));
-            store_sample(record + 3u, vec4(weight, 0.0));
+            store_sample(record + RECORD_WEIGHT, vec4(weight, 0.0));
             path.sharing = 1u;
         }
     } else if (path.depth == 1u && path.sharing == 1u && can_share(path, vertex)) {

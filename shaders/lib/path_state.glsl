@@ -18,6 +18,7 @@ const uint SHADOW_STREAMS = 0xe0000000u;
 struct Path {
     uint pixel;             // of the whole film
     uint sample_index;
+    uint group;             // where pixels share paths: of this sample
     float filter_weight;    // where the filter is wide: factor of the radiance; negative in its negative lobes
     // The ray that is asked for.
     vec3 origin;
@@ -88,20 +89,38 @@ struct Hit {
     float passed;           // shadow rays, where masks are: fraction of the light that passes them
 };
 
-// The four numbers of a set.
-vec4 sample_set(Path path, uint set) {
-    uvec4 key = set_key(params.seed, path.pixel, set, path.sample_index);
+vec4 numbers_of_set(uint seed, uint pixel, uint set, uint index) {
+    uvec4 key = set_key(seed, pixel, set, index);
     uvec2 point = uvec2(0u);
     if (set < SOBOL_SETS) {
-        point = POINT(point_index(set, path.sample_index, key));
+        point = POINT(point_index(set, index, key));
     }
     return shifted_point(point, key);
 }
 
+// The four numbers of a set.
+vec4 sample_set(Path path, uint set) {
+    if (HAS_SHARING) {
+        return numbers_of_set(half_seed(params.seed, path.sample_index), path.pixel, set, half_index(path.sample_index));
+    }
+    return numbers_of_set(params.seed, path.pixel, set, path.sample_index);
+}
+
+// The numbers of the camera's segment.
+vec4 sample_camera(Path path) {
+    vec4 own = sample_set(path, 0u);
+    if (HAS_SHARING && HAS_MEDIA) {
+        own.zw = numbers_of_set(group_seed(params.seed, path.sample_index), path.group, 0u, group_index(path.sample_index)).zw;
+    }
+    return own;
+}
+
 // The numbers for a camera's lens.
 vec4 sample_lens(Path path) {
-    uvec4 key = lens_key(params.seed, path.pixel, path.sample_index);
-    return shifted_point(POINT(point_index(LENS_SET, path.sample_index, key)), key);
+    uint seed = HAS_SHARING ? half_seed(params.seed, path.sample_index) : params.seed;
+    uint index = HAS_SHARING ? half_index(path.sample_index) : path.sample_index;
+    uvec4 key = lens_key(seed, path.pixel, index);
+    return shifted_point(POINT(point_index(LENS_SET, index, key)), key);
 }
 
 uint valid_medium(uint medium) {

@@ -1,6 +1,9 @@
 // The points of the integrand: four dimensions at a time, a "set". The first sets are low-discrepancy points from a table
 // (see src/pack/sobol.rs), with a random digital shift for each pixel; later sets are hashed.
 //
+// Where pixels share paths, the free flight and the channel of the camera's segment are those of the whole group: first vertices at the
+// same depth find each other's second vertices most easily.
+//
 // The dimensions are named, so that a feature that a scene lacks never shifts the numbers of another:
 //   set 0          pixel x, pixel y, free flight, channel        of the camera's segment
 //   set 2 s        roulette, lobe or component, free flight, channel    of segment s > 0 (the second: of the vertex before)
@@ -17,6 +20,25 @@ uvec4 set_key(uint seed, uint pixel, uint set, uint index) {
 // The random words of the set for a camera's lens: those of set 0 with other words for the seed.
 uvec4 lens_key(uint seed, uint pixel, uint index) {
     return set_key(seed ^ 0x6c656e73u, pixel, 0u, index);
+}
+
+// Where pixels share paths, the two halves of a render have numbers of their own, so that one can tell how to combine the other
+// (src/render/reconstruct.rs): of each half, the samples in order.
+uint half_seed(uint seed, uint index) {
+    return index / RUN_SAMPLES % 2u == 0u ? seed : seed ^ 0x68616c66u;
+}
+
+uint half_index(uint index) {
+    return index / (2u * RUN_SAMPLES) * RUN_SAMPLES + index % RUN_SAMPLES;
+}
+
+// The same for numbers that the pixels of a group have in common, from a key of its own for each half and shift.
+uint group_seed(uint seed, uint index) {
+    return seed ^ 0x67726f70u ^ index / RUN_SAMPLES % (2u * RUN_SHIFTS) << 16u;
+}
+
+uint group_index(uint index) {
+    return index / (2u * RUN_SHIFTS * RUN_SAMPLES) * RUN_SAMPLES + index % RUN_SAMPLES;
 }
 
 // Which of the table's points is next, for a set below SOBOL_SETS, or LENS_SET. The lowest bits of the key do not reach the numbers.

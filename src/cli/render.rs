@@ -188,7 +188,7 @@ mod tests {
             let block = |first: u32| {
                 let count = 16.min(samples.end - first);
                 let sum = vec![[count as f32 * self.value; 3]; 6];
-                Block { first, count, squares: sum.clone(), sums: sum, invalid: self.invalid }
+                Block { first, count, squares: sum.clone(), sums: sum, shared: None, invalid: self.invalid }
             };
             Ok(samples.clone().step_by(16).map(block).collect())
         }

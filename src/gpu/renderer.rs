@@ -7,7 +7,8 @@ use super::{Device, Error};
 use crate::pack::Packed;
 use crate::pack::layout::{Dispatch, RECORD_VECTORS, TILE};
 use crate::pack::sobol;
-use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo};
+use crate::pack::groups::{group_margin, group_offset};
+use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo, RUN_SAMPLES, Shared};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -93,7 +94,7 @@ impl Renderer {
             return Err(Error::TooLarge { name, size, limit });
         }
         let crop = [packed.params.crop_width, packed.params.crop_height];
-        let pixels = tile_count(crop) as usize * TILE_PIXELS;
+        let pixels = tile_count(crop, sharers as u32) as usize * TILE_PIXELS;
         let most = if variant.buffer_reference { u64::MAX } else { device.max_binding };
         let capacity = capacity(pixels, sharers, most);
         Ok(Renderer {
@@ -104,7 +105,7 @@ impl Renderer {
             tables,
             params: Buffer::new(device, "params", &[packed.params])?,
             samples: Buffer::zeroed::<[f32; 4]>(device, "samples", capacity * vectors_of_sample(sharers))?,
-            sums: Buffer::zeroed::<[f32; 4]>(device, "sums", sums_length(pixels, capacity))?,
+            sums: Buffer::zeroed::<[f32; 4]>(device, "sums", sums_length(pixels, capacity, sharers))?,
             invalid: Buffer::zeroed::<[u32; 4]>(device, "invalid", capacity / TILE_PIXELS)?,
             crop,
             capacity,
@@ -114,10 +115,10 @@ impl Renderer {
     /// Bytes that a crop window of so many pixels takes on the device, and on the host for the blocks of one dispatch; both
     /// beside the tables of the scene.
     pub fn working_memory(crop: [u32; 2], sharers: u32) -> (u64, u64) {
-        let pixels = tile_count(crop) as usize * TILE_PIXELS;
+        let pixels = tile_count(crop, sharers) as usize * TILE_PIXELS;
         let capacity = capacity(pixels, sharers as usize, u64::MAX);
         let of_samples = capacity * vectors_of_sample(sharers as usize);
-        let quads = of_samples + sums_length(pixels, capacity) + capacity / TILE_PIXELS;
+        let quads = of_samples + sums_length(pixels, capacity, sharers as usize) + capacity / TILE_PIXELS;
         // A block has a sum and a sum of squares for each channel of a pixel.
         let blocks = (capacity / pixels / BLOCK_SAMPLES as usize).max(1);
         let block = u64::from(crop[0]) * u64::from(crop[1]) * size_of::<[[f32; 3]; 2]>() as u64;
@@ -157,30 +158,49 @@ impl Renderer {
         let groups = (pixels as u32).div_ceil(self.device.subgroup_size);
         let buffers = [&self.samples, &self.sums, &self.invalid, &self.params];
         self.resolve.dispatch(&buffers, bytemuck::bytes_of(&work), groups)?;
-        self.collect(tiles.start, pixels, blocks);
+        self.collect(&samples, tiles.start, pixels, blocks);
         Ok(())
     }
 
     /// Takes the sums of a dispatch from tiles to rows of the crop window.
-    fn collect(&self, first_tile: u32, pixels: usize, blocks: &mut [Block]) {
-        let sums: Vec<[[f32; 4]; 2]> = self.sums.read(pixels * blocks.len());
-        let invalid: Vec<[u32; 4]> = self.invalid.read(blocks.len());
+    fn collect(&self, samples: &Range<u32>, first_tile: u32, pixels: usize, blocks: &mut [Block]) {
+        let sharers = self.sharers();
+        let (samples_of_sum, vectors) = sum_format(sharers as usize);
+        let starts = samples.clone().step_by(samples_of_sum);
+        let sums: Vec<[f32; 4]> = self.sums.read(vectors * pixels * starts.len());
         let [width, height] = self.crop.map(|side| side as usize);
-        let tiles_across = width.div_ceil(TILE as usize);
-        for ((block, sums), invalid) in blocks.iter_mut().zip(sums.chunks_exact(pixels)).zip(&invalid) {
-            for (slot, [sum, squares]) in sums.iter().enumerate() {
+        let tiles_across = (width + group_margin(sharers)[0] as usize).div_ceil(TILE as usize);
+        for (start, sums) in starts.zip(sums.chunks_exact(vectors * pixels)) {
+            let in_dispatch = start - samples.start;
+            let block = &mut blocks[(in_dispatch / BLOCK_SAMPLES) as usize];
+            let run = (in_dispatch % BLOCK_SAMPLES / RUN_SAMPLES) as usize;
+            let [dx, dy] = group_offset(sharers, start).map(|shift| shift as usize);
+            for (slot, sums) in sums.chunks_exact(vectors).enumerate() {
                 let (tile, pixel) = (first_tile as usize + slot / TILE_PIXELS, slot % TILE_PIXELS);
-                let x = tile % tiles_across * TILE as usize + pixel % TILE as usize;
-                let y = tile / tiles_across * TILE as usize + pixel / TILE as usize;
+                let x = (tile % tiles_across * TILE as usize + pixel % TILE as usize).wrapping_sub(dx);
+                let y = (tile / tiles_across * TILE as usize + pixel / TILE as usize).wrapping_sub(dy);
                 if x < width && y < height {
-                    block.sums[y * width + x] = [sum[0], sum[1], sum[2]];
-                    block.squares[y * width + x] = [squares[0], squares[1], squares[2]];
+                    let pixel = y * width + x;
+                    for q in 0..3 {
+                        block.sums[pixel][q] += sums[0][q];
+                        block.squares[pixel][q] += sums[1][q];
+                    }
+                    if let Some(shared) = &mut block.shared {
+                        shared.runs[run][pixel] = [sums[2][0], sums[2][1], sums[2][2]];
+                    }
                 }
             }
+        }
+        let invalid: Vec<[u32; 4]> = self.invalid.read(blocks.len());
+        for (block, invalid) in blocks.iter_mut().zip(&invalid) {
             for (total, count) in block.invalid.iter_mut().zip(invalid) {
                 *total += u64::from(*count);
             }
         }
+    }
+
+    fn sharers(&self) -> u32 {
+        self.sharing.as_ref().map_or(0, |sharing| sharing.sharers)
     }
 }
 
@@ -197,7 +217,8 @@ impl Backend for Renderer {
 
 fn render_all(renderer: &mut Renderer, samples: Range<u32>) -> Result<Vec<Block>, Error> {
     assert!(samples.start.is_multiple_of(BLOCK_SAMPLES), "blocks are aligned");
-    let tile_count = tile_count(renderer.crop);
+    let sharers = renderer.sharers();
+    let tile_count = tile_count(renderer.crop, sharers);
     let pixel_count = renderer.crop[0] as usize * renderer.crop[1] as usize;
     let mut blocks = Vec::new();
     let mut first = samples.start;
@@ -213,6 +234,10 @@ fn render_all(renderer: &mut Renderer, samples: Range<u32>) -> Result<Vec<Block>
                 count: (last - start).min(BLOCK_SAMPLES),
                 sums: vec![[0.0; 3]; pixel_count],
                 squares: vec![[0.0; 3]; pixel_count],
+                shared: (sharers > 0).then(|| Shared {
+                    sharers,
+                    runs: vec![vec![[0.0; 3]; pixel_count]; (last - start).min(BLOCK_SAMPLES).div_ceil(RUN_SAMPLES) as usize],
+                }),
                 invalid: [0; 3],
             })
             .collect();
@@ -240,13 +265,21 @@ fn vectors_of_sample(sharers: usize) -> usize {
     if sharers == 0 { 1 } else { 1 + RECORD_VECTORS as usize + sharers }
 }
 
-/// Sums and sums of squares of the blocks in flight.
-fn sums_length(pixels: usize, capacity: usize) -> usize {
-    2 * capacity.div_ceil(BLOCK_SAMPLES as usize) + pixels.min(capacity) * 2
+/// Samples in a sum, and vectors of four numbers that it takes: the sum, the sum of squares, and where pixels share paths what they share.
+fn sum_format(sharers: usize) -> (usize, usize) {
+    if sharers == 0 { (BLOCK_SAMPLES as usize, 2) } else { (RUN_SAMPLES as usize, 3) }
 }
 
-fn tile_count(crop: [u32; 2]) -> u32 {
-    crop[0].div_ceil(TILE) * crop[1].div_ceil(TILE)
+/// Vectors of all sums in flight.
+fn sums_length(pixels: usize, capacity: usize, sharers: usize) -> usize {
+    let (samples, vectors) = sum_format(sharers);
+    vectors * (capacity.div_ceil(samples) + pixels.min(capacity))
+}
+
+/// Tiles that cover the crop window, wherever groups are shifted.
+fn tile_count(crop: [u32; 2], sharers: u32) -> u32 {
+    let margin = group_margin(sharers);
+    (crop[0] + margin[0]).div_ceil(TILE) * (crop[1] + margin[1]).div_ceil(TILE)
 }
 
 /// A number near the golden section of `count` that has no factor in common with it.

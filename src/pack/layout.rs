@@ -552,6 +552,8 @@ pub const MEDIUM_SEALED: u32 = 1 << 28;
 pub const TILE: u32 = 8;
 /// Vectors of four numbers in the record of a path that pixels share: see `lib/path_share.glsl`.
 pub const RECORD_VECTORS: u32 = 12;
+/// Which of them holds the weight of the first vertex, and in the end what the group brought.
+pub const RECORD_WEIGHT: u32 = 3;
 /// Longest distance; rays that end nowhere end here.
 pub const INFINITE_DISTANCE: f32 = 1e30;
 
@@ -624,7 +626,10 @@ pub fn glsl() -> String {
         ("MEDIUM_EMISSION_GRID", MEDIUM_EMISSION_GRID),
         ("TILE", TILE),
         ("RECORD_VECTORS", RECORD_VECTORS),
+        ("RECORD_WEIGHT", RECORD_WEIGHT),
         ("BLOCK_SAMPLES", crate::render::BLOCK_SAMPLES),
+        ("RUN_SAMPLES", crate::render::RUN_SAMPLES),
+        ("RUN_SHIFTS", crate::render::RUN_SHIFTS),
         ("POINT_BITS", sobol::POINT_BITS),
         ("POINT_COUNT", sobol::POINT_COUNT),
         ("SOBOL_SETS", sobol::SOBOL_SETS),

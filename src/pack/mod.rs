@@ -10,6 +10,7 @@ pub mod filter;
 mod flight;
 pub mod frame;
 pub mod grid;
+pub mod groups;
 pub mod immediate;
 pub mod layout;
 pub mod lights;

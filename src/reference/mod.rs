@@ -35,14 +35,13 @@ pub mod toward_light;
 pub mod warp;
 
 use crate::pack::Packed;
-use crate::pack::layout::TILE;
-use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo};
+use crate::pack::groups::groups;
+use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo, RUN_SAMPLES, Shared};
 use bindings::Tables;
 use bvh::{grid_ray, next_primitive, start_walk, step_walk};
-use film::tile_pixel;
 use glam::DVec3;
 use path::{Path, begin_hit, path_answer, path_start, test_primitive};
-use path_share::{group_of, share, share_rest};
+use path_share::{share, share_rest};
 use ray::Ray;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -61,33 +60,41 @@ impl Renderer {
     }
 
     fn render_block(&self, samples: Range<u32>) -> Block {
-        let [width, height] = [self.tables.params.crop_width, self.tables.params.crop_height];
+        let crop = [self.tables.params.crop_width, self.tables.params.crop_height];
+        let pixels = (crop[0] * crop[1]) as usize;
+        let sharers = self.tables.features.sharers;
         let mut block = Block {
             first: samples.start,
             count: samples.end - samples.start,
-            sums: vec![[0.0; 3]; (width * height) as usize],
-            squares: vec![[0.0; 3]; (width * height) as usize],
+            sums: vec![[0.0; 3]; pixels],
+            squares: vec![[0.0; 3]; pixels],
+            shared: (sharers > 0).then(|| Shared { sharers, runs: Vec::new() }),
             invalid: [0; 3],
         };
-        let tiles = width.div_ceil(TILE) * height.div_ceil(TILE);
-        // In parallel by pixel or group of pixels, in the order of tiles; the samples of each in order, so the sums are always the same.
-        let sharers = self.tables.features.sharers;
-        let pixels: Vec<(usize, PixelSums)> = (0..tiles * TILE * TILE)
-            .into_par_iter()
-            .filter_map(|slot| {
-                let pixel = tile_pixel(slot / (TILE * TILE), slot % (TILE * TILE), width);
-                let mut group = if sharers == 0 { vec![pixel] } else { group_of(pixel, sharers)? };
-                group.retain(|[x, y]| *x < width && *y < height);
-                let sums = self.group_sums(&group, samples.clone());
-                Some(group.into_iter().map(|[x, y]| (y * width + x) as usize).zip(sums).collect::<Vec<_>>())
-            })
-            .flatten()
-            .collect();
-        for (index, pixel) in pixels {
-            block.sums[index] = pixel.sum.as_vec3().to_array();
-            block.squares[index] = pixel.squares.as_vec3().to_array();
-            for (total, count) in block.invalid.iter_mut().zip(pixel.invalid) {
-                *total += count;
+        let samples_of_run = if sharers == 0 { BLOCK_SAMPLES } else { RUN_SAMPLES };
+        for first in samples.clone().step_by(samples_of_run as usize) {
+            let run = first..samples.end.min(first + samples_of_run);
+            // In parallel by pixel or group of pixels; the samples of each in order, so the sums are always the same.
+            let sums: Vec<(usize, PixelSums)> = groups(crop, sharers, first)
+                .into_par_iter()
+                .flat_map_iter(|group| {
+                    let sums = self.group_sums(&group, run.clone());
+                    group.into_iter().map(|[x, y]| (y * crop[0] + x) as usize).zip(sums)
+                })
+                .collect();
+            let mut shared = vec![[0.0; 3]; pixels];
+            for (index, pixel) in sums {
+                for q in 0..3 {
+                    block.sums[index][q] += pixel.sum[q] as f32;
+                    block.squares[index][q] += pixel.squares[q] as f32;
+                }
+                shared[index] = pixel.shared.as_vec3().to_array();
+                for (total, count) in block.invalid.iter_mut().zip(pixel.invalid) {
+                    *total += count;
+                }
+            }
+            if let Some(of_block) = &mut block.shared {
+                of_block.runs.push(shared);
             }
         }
         block
@@ -100,11 +107,11 @@ impl Renderer {
         let pixels: Vec<u32> = group.iter().map(index).collect();
         let mut sums: Vec<PixelSums> = group.iter().map(|_| PixelSums::default()).collect();
         for sample_index in samples {
-            let values = weighted_radiances(&self.tables, &pixels, sample_index);
-            for (sums, (value, filter_weight)) in sums.iter_mut().zip(values) {
-                sums.sum += value;
-                sums.squares += value * value;
-                let positive = if filter_weight < 0.0 { -value } else { value };
+            for (sums, found) in sums.iter_mut().zip(find_samples(&self.tables, &pixels, sample_index)) {
+                sums.sum += found.value;
+                sums.squares += found.value * found.value;
+                sums.shared += found.shared;
+                let positive = if found.filter_weight < 0.0 { -found.value } else { found.value };
                 if let Some(cause) = invalid_cause(positive, self.tables.features.pilot) {
                     sums.invalid[cause] += 1;
                 }
@@ -131,6 +138,7 @@ impl Backend for Renderer {
 struct PixelSums {
     sum: DVec3,
     squares: DVec3,
+    shared: DVec3,
     invalid: [u64; 3],
 }
 
@@ -154,27 +162,38 @@ pub fn sample_radiance(packed: &Packed, pixel: u32, sample_index: u32) -> DVec3 
 
 /// Mirror of the loop of `path_trace.comp` for one sample of a pixel that shares nothing: what it adds to its pixel.
 pub fn trace(tables: &Tables, pixel: u32, sample_index: u32) -> DVec3 {
-    weighted_radiances(tables, &[pixel], sample_index)[0].0
+    find_samples(tables, &[pixel], sample_index)[0].value
 }
 
-/// What a sample adds to each pixel of a group, and its factor by the reconstruction filter, which may be negative.
-fn weighted_radiances(tables: &Tables, pixels: &[u32], sample_index: u32) -> Vec<(DVec3, f64)> {
-    let (mut values, mut records) = (Vec::new(), Vec::new());
+/// What a sample adds to a pixel.
+struct Found {
+    value: DVec3,
+    /// Of this, what the group brought.
+    shared: DVec3,
+    /// Factor by the reconstruction filter, in both; it may be negative.
+    filter_weight: f64,
+}
+
+/// What a sample adds to each pixel of a group.
+fn find_samples(tables: &Tables, pixels: &[u32], sample_index: u32) -> Vec<Found> {
+    let (mut found, mut records) = (Vec::new(), Vec::new());
     for pixel in pixels {
         let mut path = path_start(tables, *pixel, sample_index);
         while path.alive || path.shadow {
             let hit = traverse(tables, &path);
             path_answer(tables, &mut path, &hit);
         }
-        values.push((share_rest(&mut path) + path.record.base, path.filter_weight));
+        let value = (share_rest(&mut path) + path.record.base) * path.filter_weight;
+        found.push(Found { value, shared: DVec3::ZERO, filter_weight: path.filter_weight });
         records.push(path.record);
     }
     if tables.features.sharers > 0 {
-        for ((value, _), brought) in values.iter_mut().zip(share(tables, &records)) {
-            *value += brought;
+        for (found, brought) in found.iter_mut().zip(share(tables, &records)) {
+            found.shared = brought * found.filter_weight;
+            found.value += found.shared;
         }
     }
-    values.into_iter().map(|(value, filter_weight)| (value * filter_weight, filter_weight)).collect()
+    found
 }
 
 /// Answers the ray that a path asks for.

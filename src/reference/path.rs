@@ -4,6 +4,7 @@
 use super::bindings::{Medium, Params, Surface, Tables};
 use super::bsdf::bsdf_has_density;
 use super::camera::{camera_direction, focused_direction, lens_point};
+use super::film::{group_offset, group_size};
 use super::filter::sample_filter;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::channel_weights;
@@ -18,7 +19,7 @@ pub use super::path_rays::{begin_hit, test_primitive};
 use super::path_share::{share_ended, share_light, share_vertex};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
-    INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_lens, sample_set, survived_throughput,
+    INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_camera, sample_lens, sample_set, survived_throughput,
 };
 use super::path_surface::{
     Place, apply_textures, opacity_at, shading_normal, share_at, surface_tangent, texture_coordinates, turn_frame,
@@ -59,8 +60,14 @@ fn filtered_place(tables: &Tables, path: &mut Path, corner: DVec2, u: DVec2) -> 
 pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     let mut path = Path { pixel, sample_index, ..Path::default() };
     let params = &tables.params;
-    let u = sample_set(tables, &path, 0);
     let (row, column) = (pixel / params.film_width, pixel % params.film_width);
+    if tables.features.sharers > 0 {
+        let [dx, dy] = group_offset(tables.features.sharers, sample_index);
+        let [columns, rows] = group_size(tables.features.sharers);
+        let group = [(column - params.crop_x + dx) / columns, (row - params.crop_y + dy) / rows];
+        path.group = group[1] * params.film_width + group[0];
+    }
+    let u = sample_camera(tables, &path);
     let corner = DVec2::new(f64::from(column), f64::from(row));
     let place = filtered_place(tables, &mut path, corner, u.xy());
     let film = place * DVec2::new(params.inverse_width, params.inverse_height);

@@ -11,9 +11,6 @@ use crate::pack::layout::{BSDF_DIFFUSE, SURFACE_KIND_SHIFT, SURFACE_SMOOTH};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Pixels of a group are this far apart.
-const SHARE_STEP: u32 = 2;
-
 /// Rays end this many times the offset of rays that leave a surface before it.
 const END_MARGIN: f64 = 4.0;
 
@@ -67,19 +64,6 @@ pub struct Record {
     pub rest: DVec3,
     /// From where that comes.
     pub rest_direction: DVec3,
-}
-
-/// Columns and rows of a group.
-fn share_size(sharers: u32) -> [u32; 2] {
-    [2, if sharers == 4 { 2 } else { 4 }]
-}
-
-/// The pixels of the group that a pixel begins, if it does.
-pub fn group_of(pixel: [u32; 2], sharers: u32) -> Option<Vec<[u32; 2]>> {
-    let [columns, rows] = share_size(sharers);
-    let first = pixel[0] % (SHARE_STEP * columns) < SHARE_STEP && pixel[1] % (SHARE_STEP * rows) < SHARE_STEP;
-    let place = |n: u32| [pixel[0] + SHARE_STEP * (n % columns), pixel[1] + SHARE_STEP * (n / columns)];
-    first.then(|| (0..sharers).map(place).collect())
 }
 
 /// Whether a vertex scatters in a way that is known without its place on a surface.

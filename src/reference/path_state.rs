@@ -5,7 +5,7 @@ use super::light::{alias_keeps, alias_line};
 use super::math::{exp_minus_rgb, minus_log_1m};
 use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
 use super::path_share::Record;
-use super::sampler::{lens_key, point_index, set_key, shifted_point};
+use super::sampler::{group_index, group_seed, half_index, half_seed, lens_key, point_index, set_key, shifted_point};
 use crate::pack::layout::{self, MEDIUM_HEIGHT, MEDIUM_VOXELS};
 use crate::pack::sobol::{LENS_SET, SOBOL_SETS};
 use glam::{DVec2, DVec3, DVec4};
@@ -32,6 +32,8 @@ pub struct Path {
     pub pixel: u32,
     /// Of the pixel.
     pub sample_index: u32,
+    /// Where pixels share paths, that of this sample.
+    pub group: u32,
     /// Factor of the radiance by the reconstruction filter; negative in its negative lobes.
     pub filter_weight: f64,
     /// Of the ray that is asked for.
@@ -147,16 +149,38 @@ pub struct Hit {
 
 /// The four numbers of a set.
 pub fn sample_set(tables: &Tables, path: &Path, set: u32) -> DVec4 {
-    let key = set_key(tables.params.seed, path.pixel, set, path.sample_index);
-    let point =
-        if set < SOBOL_SETS { tables.points[point_index(set, path.sample_index, key) as usize] } else { [0; 2] };
+    let (seed, index) = seed_and_index(tables, path);
+    numbers_of_set(tables, seed, path.pixel, set, index)
+}
+
+fn numbers_of_set(tables: &Tables, seed: u32, pixel: u32, set: u32, index: u32) -> DVec4 {
+    let key = set_key(seed, pixel, set, index);
+    let point = if set < SOBOL_SETS { tables.points[point_index(set, index, key) as usize] } else { [0; 2] };
     shifted_point(point, key)
+}
+
+/// Of a path's own numbers.
+fn seed_and_index(tables: &Tables, path: &Path) -> (u32, u32) {
+    let (seed, index) = (tables.params.seed, path.sample_index);
+    if tables.features.sharers == 0 { (seed, index) } else { (half_seed(seed, index), half_index(index)) }
+}
+
+/// The numbers of the camera's segment.
+pub fn sample_camera(tables: &Tables, path: &Path) -> DVec4 {
+    let own = sample_set(tables, path, 0);
+    if tables.features.sharers == 0 {
+        return own;
+    }
+    let seed = group_seed(tables.params.seed, path.sample_index);
+    let of_group = numbers_of_set(tables, seed, path.group, 0, group_index(path.sample_index));
+    DVec4::new(own.x, own.y, of_group.z, of_group.w)
 }
 
 /// The numbers for a camera's lens.
 pub fn sample_lens(tables: &Tables, path: &Path) -> DVec4 {
-    let key = lens_key(tables.params.seed, path.pixel, path.sample_index);
-    shifted_point(tables.points[point_index(LENS_SET, path.sample_index, key) as usize], key)
+    let (seed, index) = seed_and_index(tables, path);
+    let key = lens_key(seed, path.pixel, index);
+    shifted_point(tables.points[point_index(LENS_SET, index, key) as usize], key)
 }
 
 /// A medium by its index.

@@ -1,6 +1,7 @@
 //! The film: sums of samples in double precision, and what can be said of them.
 
-use super::{BLOCK_SAMPLES, Block, INVALID_CAUSES};
+use super::{BLOCK_SAMPLES, Block, INVALID_CAUSES, RUN_SAMPLES, RUN_SHIFTS, Shared};
+use crate::pack::groups::{run_half, run_shift};
 
 /// Fraction of the film's mean below which a pixel's relative error is taken against this floor, as in
 /// [`crate::image::metrics`].
@@ -20,8 +21,30 @@ pub struct Film {
     sums: Vec<[f64; 3]>,
     /// Σ radiance² of each pixel.
     squares: Vec<[f64; 3]>,
+    /// Where pixels share paths, what was shared.
+    shared: Option<SharedSums>,
     /// Samples found invalid, for each of [`INVALID_CAUSES`].
     invalid: [u64; INVALID_CAUSES.len()],
+}
+
+/// What the pixels shared, apart for each half and shift of the groups.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SharedSums {
+    /// Pixels of a group.
+    pub sharers: u32,
+    /// For each half of the render and each shift of its groups.
+    pub halves: [[SharedSum; RUN_SHIFTS as usize]; 2],
+}
+
+/// What the pixels shared while the groups lay alike.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SharedSum {
+    /// Samples in each pixel.
+    pub count: u32,
+    /// Index of one of the samples, which tells the shift; 0 if there are none.
+    pub sample_index: u32,
+    /// Σ shared radiance of each pixel; empty if there are no samples.
+    pub sums: Vec<[f64; 3]>,
 }
 
 impl Film {
@@ -31,7 +54,7 @@ impl Film {
     /// When `first` is not a multiple of [`BLOCK_SAMPLES`].
     pub fn new(pixels: usize, first: u32) -> Self {
         assert!(first.is_multiple_of(BLOCK_SAMPLES), "a film begins with a block");
-        Film { first, end: first, sums: vec![[0.0; 3]; pixels], squares: vec![[0.0; 3]; pixels], invalid: [0; _] }
+        Film { first, end: first, sums: vec![[0.0; 3]; pixels], squares: vec![[0.0; 3]; pixels], shared: None, invalid: [0; _] }
     }
 
     /// Adds the block that follows the last one.
@@ -48,10 +71,31 @@ impl Film {
         assert_eq!(block.squares.len(), self.squares.len(), "a block has a sum of squares for each pixel");
         accumulate(&mut self.sums, &block.sums);
         accumulate(&mut self.squares, &block.squares);
+        if let Some(shared) = &block.shared {
+            self.add_shared(block, shared);
+        }
         for (total, invalid) in self.invalid.iter_mut().zip(block.invalid) {
             *total += invalid;
         }
         self.end += block.count;
+    }
+
+    fn add_shared(&mut self, block: &Block, shared: &Shared) {
+        let pixels = self.pixels();
+        let sums = self.shared.get_or_insert_with(|| SharedSums { sharers: shared.sharers, halves: Default::default() });
+        assert_eq!(shared.sharers, sums.sharers, "groups do not change while a scene is rendered");
+        for (first, run) in (block.first..).step_by(RUN_SAMPLES as usize).zip(&shared.runs) {
+            let sum = &mut sums.halves[run_half(first) as usize][run_shift(first) as usize];
+            sum.sums.resize(pixels, [0.0; 3]);
+            sum.sample_index = first;
+            sum.count += RUN_SAMPLES.min(block.first + block.count - first);
+            accumulate(&mut sum.sums, run);
+        }
+    }
+
+    /// What the pixels have shared so far, if they share paths.
+    pub fn shared(&self) -> Option<&SharedSums> {
+        self.shared.as_ref()
     }
 
     /// The samples in the film.
@@ -143,7 +187,7 @@ mod tests {
         let sum = samples.iter().sum::<f32>();
         let squares = samples.iter().map(|s| s * s).sum::<f32>();
         let (sums, squares) = (vec![[sum, 2.0 * sum, 0.0]], vec![[squares, 4.0 * squares, 0.0]]);
-        Block { first, count: samples.len() as u32, sums, squares, invalid: [0; 3] }
+        Block { first, count: samples.len() as u32, sums, squares, shared: None, invalid: [0; 3] }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use glam::{DMat4, DVec3, DVec4};
 
-use super::DeviceInfo;
+use super::{DeviceInfo, reconstruct};
 use super::film::Film;
 use super::scene_hash::scene_hash;
 use super::session::{Outcome, Rendered};
@@ -24,7 +24,7 @@ pub fn assemble(scene: &Scene, rendered: &Rendered, device: &DeviceInfo, seed: u
     let mut image = Image::new(crop.width as usize, crop.height as usize);
     let Rendered { film, outcome, elapsed } = rendered;
     image.metadata = metadata(scene, film, *outcome, *elapsed, device, seed);
-    let mean = film.mean();
+    let mean = reconstruct::image(film, crop.width);
     for (q, name) in ["R", "G", "B"].into_iter().enumerate() {
         image.push(name, mean.iter().map(|pixel| pixel[q] as f32).collect());
     }

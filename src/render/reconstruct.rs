@@ -1,0 +1,296 @@
+//! The image behind samples whose noise pixels have in common.
+//!
+//! Where pixels share paths ([`crate::reference::path_share`]), the pixels of a group get their light from the same second vertices, so
+//! that most of the noise of what they share is the same for all of them, while from one run of samples to the next the groups lie
+//! elsewhere. So what a group says of the differences between its pixels is worth far more than what it says of their mean. With a
+//! covariance of the noise of a group's sample of
+//!
+//! C = s u uᵀ + diag(u d u),
+//!
+//! where u is the expected shared radiance, d the relative variance of the noise that each pixel has alone, and s that of what the group
+//! has in common, the best linear estimate of the image I (Aitken 1935, "On least squares and linear combinations of observations") is
+//! the solution of
+//!
+//! Σ_groups n C⁻¹ I = Σ_groups C⁻¹ x,
+//!
+//! where x is the sum of n samples. Gradient-domain rendering (Lehtinen et al. 2013; Kettunen et al. 2015) solves such a system for
+//! differences of neighbours with one weight for all; here groups of pixels are the observations, and the weights are measured.
+//!
+//! The estimate is unbiased as long as the weights do not depend on the samples that they weigh. A render therefore has two halves with
+//! random numbers of their own: the weights of each half are measured on the other one.
+
+use super::film::{Film, SharedSum, SharedSums};
+use crate::pack::groups::{group_offset, group_size};
+use glam::DVec3;
+
+/// A pixel is taken to share at least this part of the mean of all.
+const FLOOR: f64 = 0.05;
+/// The least variance of a pixel's own noise, over its median.
+const LEAST_NOISE: f64 = 0.1;
+/// Weights of neighbours in the mean of variances: binomial, of a standard deviation of one pixel.
+const KERNEL: [f64; 5] = [1.0, 4.0, 6.0, 4.0, 1.0];
+/// The solution's residual over that of the start, and the most steps for it.
+const TOLERANCE: f64 = 1e-5;
+const MOST_STEPS: usize = 200;
+
+/// The image of a film with so many columns: the mean of each pixel's samples, where pixels share paths with the shared part as above.
+/// Fewer samples than two runs of each half (16), or samples that are not finite, leave the mean.
+///
+/// # Panics
+/// When the film is empty.
+pub fn image(film: &Film, width: u32) -> Vec<[f64; 3]> {
+    let mut image = film.mean();
+    let Some(shared) = film.shared() else { return image };
+    let Some(better) = shared_part(shared, width as usize) else { return image };
+    let plain = mean(shared.halves.iter().flatten(), image.len());
+    for ((pixel, better), plain) in image.iter_mut().zip(better).zip(plain) {
+        for q in 0..3 {
+            pixel[q] += better[q] - plain[q];
+        }
+    }
+    image
+}
+
+/// Mean of sums over all their samples.
+fn mean<'a>(sums: impl Iterator<Item = &'a SharedSum>, pixels: usize) -> Vec<DVec3> {
+    let mut mean = vec![DVec3::ZERO; pixels];
+    let mut count = 0.0;
+    for sum in sums {
+        count += f64::from(sum.count);
+        mean.iter_mut().zip(&sum.sums).for_each(|(mean, sum)| *mean += DVec3::from_array(*sum));
+    }
+    mean.iter_mut().for_each(|mean| *mean /= count);
+    mean
+}
+
+/// The shared part, if it is known better than by its mean.
+fn shared_part(shared: &SharedSums, width: usize) -> Option<Vec<DVec3>> {
+    let halves = shared.halves.each_ref().map(|half| Half::of(half, shared.sharers, width));
+    let [one, two] = [halves[0].as_ref()?, halves[1].as_ref()?];
+    let (by_one, by_two) = rayon::join(|| Weights::of(one), || Weights::of(two));
+    let (by_one, by_two) = (by_one?, by_two?);
+    let (first, second) = rayon::join(|| solve(one, &by_two), || solve(two, &by_one));
+    let part = one.samples / (one.samples + two.samples);
+    Some(first.into_iter().zip(second).map(|(a, b)| a * part + b * (1.0 - part)).collect())
+}
+
+/// The samples of a half whose groups lay alike.
+struct Observation<'a> {
+    samples: f64,
+    sums: &'a [[f64; 3]],
+    /// Of each pixel.
+    group: Vec<u32>,
+    group_count: usize,
+}
+
+impl Observation<'_> {
+    fn of(sum: &SharedSum, sharers: u32, width: usize) -> Observation<'_> {
+        let [columns, rows] = group_size(sharers).map(|side| side as usize);
+        let [dx, dy] = group_offset(sharers, sum.sample_index).map(|shift| shift as usize);
+        let across = (width + dx).div_ceil(columns);
+        let group = |pixel: usize| (((pixel / width + dy) / rows) * across + (pixel % width + dx) / columns) as u32;
+        let group_count = across * (sum.sums.len() / width + dy).div_ceil(rows);
+        let group = (0..sum.sums.len()).map(group).collect();
+        Observation { samples: f64::from(sum.count), sums: &sum.sums, group, group_count }
+    }
+
+    /// Sum over the pixels of each group.
+    fn group_sums<T: Copy + Default + std::ops::AddAssign>(&self, of_pixel: impl Fn(usize) -> T) -> Vec<T> {
+        let mut sums = vec![T::default(); self.group_count];
+        for (pixel, group) in self.group.iter().enumerate() {
+            sums[*group as usize] += of_pixel(pixel);
+        }
+        sums
+    }
+}
+
+/// One half of a render.
+struct Half<'a> {
+    samples: f64,
+    observations: Vec<Observation<'a>>,
+    mean: Vec<DVec3>,
+    width: usize,
+}
+
+impl Half<'_> {
+    /// Nothing, if the groups lay in one way only, or if a sample is not finite.
+    fn of(sums: &[SharedSum], sharers: u32, width: usize) -> Option<Half<'_>> {
+        let observations: Vec<Observation> = (sums.iter().filter(|sum| sum.count > 0))
+            .map(|sum| Observation::of(sum, sharers, width))
+            .collect();
+        let pixels = observations.first()?.sums.len();
+        let mean = mean(sums.iter(), pixels);
+        let samples = observations.iter().map(|observation| observation.samples).sum();
+        let usable = observations.len() > 1 && mean.iter().all(|mean| mean.is_finite());
+        usable.then_some(Half { samples, observations, mean, width })
+    }
+}
+
+/// The model of the noise.
+struct Weights {
+    /// u.
+    expected: Vec<DVec3>,
+    /// d, as 1 / d.
+    precision: Vec<f64>,
+    /// s.
+    common: f64,
+}
+
+impl Weights {
+    /// Measured on the scatter of the observations of a half about their mean. Nothing, if there is no scatter.
+    fn of(half: &Half) -> Option<Weights> {
+        let pixels = half.mean.len();
+        let average = half.mean.iter().sum::<DVec3>() / pixels as f64;
+        let floor = FLOOR * average.max(DVec3::splat(FLOOR * average.max_element()));
+        if !(floor.min_element() > 0.0) {
+            return None;
+        }
+        let expected: Vec<DVec3> = half.mean.iter().map(|mean| mean.max(DVec3::ZERO) + floor).collect();
+        let count = half.observations.len() as f64;
+        // Relative variances of one sample: of each pixel's own noise, and of all noise.
+        let (mut own, mut all) = (vec![0.0; pixels], 0.0);
+        for observation in &half.observations {
+            let scatter: Vec<f64> = (observation.sums.iter().zip(&half.mean).zip(&expected))
+                .map(|((sum, mean), expected)| {
+                    ((DVec3::from_array(*sum) / observation.samples - *mean) / *expected).element_sum() / 3.0
+                })
+                .collect();
+            let scale = observation.samples / (count - 1.0);
+            all += scale * scatter.iter().map(|scatter| scatter * scatter).sum::<f64>() / pixels as f64;
+            let members = observation.group_sums(|_| 1.0);
+            let sums = observation.group_sums(|pixel| scatter[pixel]);
+            for (pixel, group) in observation.group.iter().enumerate() {
+                let members = members[*group as usize];
+                let alone = scatter[pixel] - sums[*group as usize] / members;
+                own[pixel] += scale * alone * alone * members / f64::max(members - 1.0, 1.0);
+            }
+        }
+        let mut own = blurred(&own, half.width);
+        let least = LEAST_NOISE * median(&own);
+        own.iter_mut().for_each(|own| *own += least);
+        let common = (all - own.iter().sum::<f64>() / pixels as f64).max(0.0);
+        let known = least > 0.0 && common.is_finite();
+        known.then(|| Weights { expected, precision: own.iter().map(|own| own.recip()).collect(), common })
+    }
+}
+
+/// Mean with the neighbours, by [`KERNEL`] in both directions; beyond the edge there are none.
+fn blurred(values: &[f64], width: usize) -> Vec<f64> {
+    let height = values.len() / width;
+    let reach = KERNEL.len() / 2;
+    let along = |values: &[f64], step: usize, length: usize, place: &dyn Fn(usize) -> usize| -> Vec<f64> {
+        (0..values.len())
+            .map(|index| {
+                let at = place(index);
+                let (mut sum, mut weights) = (0.0, 0.0);
+                for k in at.saturating_sub(reach)..(at + reach + 1).min(length) {
+                    let weight = KERNEL[k + reach - at];
+                    sum += weight * values[index + k * step - at * step];
+                    weights += weight;
+                }
+                sum / weights
+            })
+            .collect()
+    };
+    let rows = along(values, 1, width, &|index| index % width);
+    along(&rows, width, height, &|index| index / width)
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The best linear estimate of the image of a half, by conjugate gradients from its mean, preconditioned by the diagonal.
+fn solve(half: &Half, weights: &Weights) -> Vec<DVec3> {
+    let system = System::of(half, weights);
+    let ratio = |a: DVec3, b: DVec3| DVec3::select(b.cmpgt(DVec3::ZERO), a / b, DVec3::ZERO);
+    let dot = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| *a * *b).sum::<DVec3>();
+    // In units of what is expected.
+    let mut image: Vec<DVec3> = half.mean.iter().zip(&weights.expected).map(|(mean, expected)| *mean / *expected).collect();
+    let applied = system.apply(&image);
+    let mut residual: Vec<DVec3> = system.right_side().into_iter().zip(applied).map(|(b, a)| b - a).collect();
+    let precondition = |residual: &[DVec3]| -> Vec<DVec3> {
+        residual.iter().zip(&system.diagonal).map(|(residual, diagonal)| *residual / *diagonal).collect()
+    };
+    let mut conditioned = precondition(&residual);
+    let mut direction = conditioned.clone();
+    let mut square = dot(&residual, &conditioned);
+    let enough = square * TOLERANCE * TOLERANCE;
+    for _ in 0..MOST_STEPS {
+        if square.cmple(enough).all() {
+            break;
+        }
+        let applied = system.apply(&direction);
+        let step = ratio(square, dot(&direction, &applied));
+        for (image, direction) in image.iter_mut().zip(&direction) {
+            *image += step * *direction;
+        }
+        for (residual, applied) in residual.iter_mut().zip(&applied) {
+            *residual -= step * *applied;
+        }
+        conditioned = precondition(&residual);
+        let next = dot(&residual, &conditioned);
+        let turn = ratio(next, square);
+        for (direction, conditioned) in direction.iter_mut().zip(&conditioned) {
+            *direction = *conditioned + turn * *direction;
+        }
+        square = next;
+    }
+    image.iter().zip(&weights.expected).map(|(image, expected)| *image * *expected).collect()
+}
+
+/// Σ n C⁻¹ over the groups of all observations. By Sherman and Morrison's formula, with w = 1 / d in units of what is expected,
+/// C⁻¹ = diag(w) − b w wᵀ where b = s / (1 + s Σ w) for each group.
+struct System<'a> {
+    half: &'a Half<'a>,
+    weights: &'a Weights,
+    /// b of each group of each observation.
+    removed: Vec<Vec<f64>>,
+    diagonal: Vec<f64>,
+}
+
+impl System<'_> {
+    fn of<'a>(half: &'a Half<'a>, weights: &'a Weights) -> System<'a> {
+        let mut diagonal = vec![0.0; half.mean.len()];
+        let mut removed = Vec::new();
+        for observation in &half.observations {
+            let sums = observation.group_sums(|pixel| weights.precision[pixel]);
+            let of_groups: Vec<f64> = sums.iter().map(|sum| weights.common / (1.0 + weights.common * sum)).collect();
+            for ((diagonal, group), w) in diagonal.iter_mut().zip(&observation.group).zip(&weights.precision) {
+                *diagonal += observation.samples * w * (1.0 - of_groups[*group as usize] * w);
+            }
+            removed.push(of_groups);
+        }
+        System { half, weights, removed, diagonal }
+    }
+
+    /// Adds C⁻¹ times the pixels' values, for each group of an observation.
+    fn add(&self, observation: usize, value: impl Fn(usize) -> DVec3, sum: &mut [DVec3]) {
+        let (removed, observation) = (&self.removed[observation], &self.half.observations[observation]);
+        let w = &self.weights.precision;
+        let groups = observation.group_sums(|pixel| w[pixel] * value(pixel));
+        for (pixel, (sum, group)) in sum.iter_mut().zip(&observation.group).enumerate() {
+            let group = *group as usize;
+            *sum += w[pixel] * (value(pixel) - removed[group] * groups[group]);
+        }
+    }
+
+    fn apply(&self, image: &[DVec3]) -> Vec<DVec3> {
+        let mut result = vec![DVec3::ZERO; image.len()];
+        for (index, observation) in self.half.observations.iter().enumerate() {
+            self.add(index, |pixel| image[pixel] * observation.samples, &mut result);
+        }
+        result
+    }
+
+    fn right_side(&self) -> Vec<DVec3> {
+        let mut result = vec![DVec3::ZERO; self.half.mean.len()];
+        for (index, observation) in self.half.observations.iter().enumerate() {
+            let value = |pixel: usize| DVec3::from_array(observation.sums[pixel]) / self.weights.expected[pixel];
+            self.add(index, value, &mut result);
+        }
+        result
+    }
+}
