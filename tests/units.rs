@@ -60,16 +60,21 @@ fn sets_of_the_sampler_agree_to_the_last_bit() {
             [random.bits() as u32, random.bits() as u32, (random.bits() % 12) as u32, index]
         })
         .collect();
-    let outputs: Vec<[u32; 4]> = run("sampler", &inputs, &[bytemuck::cast_slice(&table)], inputs.len(), inputs.len());
+    let outputs: Vec<[u32; 4]> =
+        run("sampler", &inputs, &[bytemuck::cast_slice(&table)], inputs.len(), 2 * inputs.len());
     let expected = |[seed, pixel, set, index]: [u32; 4]| {
         let key = sampler::set_key(seed, pixel, set, index);
         let point =
             if set < sobol::SOBOL_SETS { table[sampler::point_index(set, index, key) as usize] } else { [0; 2] };
         sampler::shifted_point(point, key).to_array()
     };
-    for (input, output) in inputs.iter().zip(outputs) {
-        let found = output.map(f32::from_bits).map(f64::from);
+    for (input, output) in inputs.iter().zip(outputs.chunks(2)) {
+        let found = output[0].map(f32::from_bits).map(f64::from);
         assert_eq!(found, expected(*input), "{input:?}");
+        let [seed, .., index] = *input;
+        let of_half = [sampler::half_seed(seed, index), sampler::half_index(index)];
+        let of_group = [sampler::group_seed(seed, index), sampler::group_index(index)];
+        assert_eq!(output[1], [of_half[0], of_half[1], of_group[0], of_group[1]], "{input:?}");
         assert!(found.iter().all(|number| (0.0..1.0).contains(number)), "{input:?}");
         let neighbour = [input[0], input[1] ^ 1, input[2], input[3]];
         assert_ne!(found, expected(neighbour), "pixels share their numbers");
@@ -456,6 +461,9 @@ fn tiles_cover_the_crop_window_once() {
     let mut seen = std::collections::HashSet::new();
     for (input, output) in inputs.iter().zip(&outputs) {
         assert_eq!(film::tile_pixel(input[0], input[1], input[2]), output[..2], "{input:?}");
+        let sharers = 4 * (input[0] % 3);
+        let ([x, y], [right, down]) = (film::group_offset(sharers, input[1]), film::group_margin(sharers));
+        assert_eq!(output[3], x | y << 8 | right << 16 | down << 24, "{input:?}");
         assert!(seen.insert(*output), "{output:?} is covered twice");
     }
     let inside = seen.iter().filter(|[x, y, ..]| *x < width && *y < height).count();

@@ -121,7 +121,7 @@ void scatter(inout Path path, Vertex vertex) {
     if (!path.alive) {
         return;
     }
-    vec4 u = sample_set(path, 2u * path.segment + 1u);
+    vec4 u = sample_vertex(path);
     float lobe = HAS_LOBES || HAS_PHASES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
     Aim aim = find_aim(path, vertex);
     BsdfSample next = sample_next(vertex, aim, u.zw, lobe, path.scattered_pdf);

@@ -115,6 +115,16 @@ vec4 sample_camera(Path path) {
     return own;
 }
 
+// The numbers of the vertex at the end of a segment.
+vec4 sample_vertex(Path path) {
+    vec4 own = sample_set(path, 2u * path.segment + 1u);
+    if (HAS_SHARING && path.segment == 0u) {
+        // Light that the first vertex samples is not shared, and better spread over the whole render.
+        own.xy = numbers_of_set(params.seed, path.pixel, 1u, path.sample_index).xy;
+    }
+    return own;
+}
+
 // The numbers for a camera's lens.
 vec4 sample_lens(Path path) {
     uint seed = HAS_SHARING ? half_seed(params.seed, path.sample_index) : params.seed;

@@ -1,5 +1,5 @@
-// Unit kernel of lib/sampler.glsl: (seed, pixel, set, index) and the table of points in; the set's numbers (bit patterns)
-// out.
+// Unit kernel of lib/sampler.glsl: (seed, pixel, set, index) and the table of points in; the set's numbers (bit patterns), and seed and
+// index of the half and of the group out.
 #version 460
 #include "lib/layout.glsl"
 #include "lib/sampler.glsl"
@@ -15,6 +15,7 @@ void main() {
         uvec4 at = inputs[i];
         uvec4 key = set_key(at.x, at.y, at.z, at.w);
         uvec2 point = at.z < SOBOL_SETS ? points[point_index(at.z, at.w, key)] : uvec2(0u);
-        outputs[i] = floatBitsToUint(shifted_point(point, key));
+        outputs[2u * i] = floatBitsToUint(shifted_point(point, key));
+        outputs[2u * i + 1u] = uvec4(half_seed(at.x, at.w), half_index(at.w), group_seed(at.x, at.w), group_index(at.w));
     }
 }

@@ -5,9 +5,9 @@ use super::kernel::Kernel;
 use super::shader::{Variant, compile_cached, expand};
 use super::{Device, Error};
 use crate::pack::Packed;
+use crate::pack::groups::{group_margin, group_offset};
 use crate::pack::layout::{Dispatch, RECORD_VECTORS, TILE};
 use crate::pack::sobol;
-use crate::pack::groups::{group_margin, group_offset};
 use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo, RUN_SAMPLES, Shared};
 use std::ops::Range;
 use std::sync::Arc;
@@ -236,7 +236,10 @@ fn render_all(renderer: &mut Renderer, samples: Range<u32>) -> Result<Vec<Block>
                 squares: vec![[0.0; 3]; pixel_count],
                 shared: (sharers > 0).then(|| Shared {
                     sharers,
-                    runs: vec![vec![[0.0; 3]; pixel_count]; (last - start).min(BLOCK_SAMPLES).div_ceil(RUN_SAMPLES) as usize],
+                    runs: vec![
+                        vec![[0.0; 3]; pixel_count];
+                        (last - start).min(BLOCK_SAMPLES).div_ceil(RUN_SAMPLES) as usize
+                    ],
                 }),
                 invalid: [0; 3],
             })

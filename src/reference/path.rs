@@ -19,7 +19,8 @@ pub use super::path_rays::{begin_hit, test_primitive};
 use super::path_share::{share_ended, share_light, share_vertex};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
-    INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_camera, sample_lens, sample_set, survived_throughput,
+    INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_camera, sample_lens, sample_set, sample_vertex,
+    survived_throughput,
 };
 use super::path_surface::{
     Place, apply_textures, opacity_at, shading_normal, share_at, surface_tangent, texture_coordinates, turn_frame,
@@ -136,7 +137,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     if !path.alive {
         return;
     }
-    let u = sample_set(tables, path, 2 * path.segment + 1);
+    let u = sample_vertex(tables, path);
     let lobe = sample_set(tables, path, 2 * path.segment + 2).y;
     let aim = find_aim(tables, path, vertex);
     let (next, scattered) = sample_next(tables, vertex, &aim, u.zw(), lobe);

@@ -176,6 +176,16 @@ pub fn sample_camera(tables: &Tables, path: &Path) -> DVec4 {
     DVec4::new(own.x, own.y, of_group.z, of_group.w)
 }
 
+/// The numbers of the vertex at the end of a segment.
+pub fn sample_vertex(tables: &Tables, path: &Path) -> DVec4 {
+    let own = sample_set(tables, path, 2 * path.segment + 1);
+    if tables.features.sharers == 0 || path.segment > 0 {
+        return own;
+    }
+    let of_render = numbers_of_set(tables, tables.params.seed, path.pixel, 1, path.sample_index);
+    DVec4::new(of_render.x, of_render.y, own.z, own.w)
+}
+
 /// The numbers for a camera's lens.
 pub fn sample_lens(tables: &Tables, path: &Path) -> DVec4 {
     let (seed, index) = seed_and_index(tables, path);

@@ -54,7 +54,14 @@ impl Film {
     /// When `first` is not a multiple of [`BLOCK_SAMPLES`].
     pub fn new(pixels: usize, first: u32) -> Self {
         assert!(first.is_multiple_of(BLOCK_SAMPLES), "a film begins with a block");
-        Film { first, end: first, sums: vec![[0.0; 3]; pixels], squares: vec![[0.0; 3]; pixels], shared: None, invalid: [0; _] }
+        Film {
+            first,
+            end: first,
+            sums: vec![[0.0; 3]; pixels],
+            squares: vec![[0.0; 3]; pixels],
+            shared: None,
+            invalid: [0; _],
+        }
     }
 
     /// Adds the block that follows the last one.
@@ -82,7 +89,8 @@ impl Film {
 
     fn add_shared(&mut self, block: &Block, shared: &Shared) {
         let pixels = self.pixels();
-        let sums = self.shared.get_or_insert_with(|| SharedSums { sharers: shared.sharers, halves: Default::default() });
+        let sums =
+            self.shared.get_or_insert_with(|| SharedSums { sharers: shared.sharers, halves: Default::default() });
         assert_eq!(shared.sharers, sums.sharers, "groups do not change while a scene is rendered");
         for (first, run) in (block.first..).step_by(RUN_SAMPLES as usize).zip(&shared.runs) {
             let sum = &mut sums.halves[run_half(first) as usize][run_shift(first) as usize];

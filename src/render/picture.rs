@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use glam::{DMat4, DVec3, DVec4};
 
-use super::{DeviceInfo, reconstruct};
 use super::film::Film;
 use super::scene_hash::scene_hash;
 use super::session::{Outcome, Rendered};
+use super::{DeviceInfo, reconstruct};
 use crate::image::{Attribute, Image, Metadata, Window};
 use crate::scene::{self, Camera, Colors, Lens, Scene};
 

@@ -181,7 +181,7 @@ mod tests {
                 let value = |pixel: usize| 1.0 / (1.0 + first as f32 + pixel as f32);
                 let sums = (0..PIXELS).map(|pixel| [value(pixel), 2.0 * value(pixel), 0.1]).collect();
                 let squares = (0..PIXELS).map(|pixel| [value(pixel), 3.0, 0.2]).collect();
-                blocks.push(Block { first, count, sums, squares, invalid: self.invalid });
+                blocks.push(Block { shared: None, first, count, sums, squares, invalid: self.invalid });
                 self.clock.set(self.clock.get() + self.block_time);
             }
             Ok(blocks)
