@@ -70,10 +70,19 @@ vec3 slide_color(Light light, vec3 point, vec3 direction) {
     return eval_texture(TEXTURE(light.texture - 1u), place);
 }
 
+// Whether what a camera ray finds of lamps is left to other rays: src/seen.rs.
+bool seen_apart(uint pixel) {
+    uint row = pixel / params.film_width - params.crop_y, column = pixel % params.film_width - params.crop_x;
+    return VALUE(params.first_seen + row * params.crop_width + column) > 0.0;
+}
+
 // Adds what a primitive emits towards the path.
 void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
     float cos_light = -dot(path.direction, normal);
     if (!HAS_AREA_LIGHTS || primitive.light == 0u || cos_light <= 0.0 || !emitters_seen(path)) {
+        return;
+    }
+    if (HAS_SEEN && path.depth == 0u && seen_apart(path.pixel)) {
         return;
     }
     Light light = LIGHT(primitive.light - 1u);

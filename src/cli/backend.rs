@@ -9,6 +9,7 @@ use tyndall::reference;
 use tyndall::render::{Backend, BackendError};
 use tyndall::scene::Scene;
 use tyndall::scene::mitsuba::{self, Loaded};
+use tyndall::seen::{Seen, WithSeen};
 
 use super::error::CliError;
 
@@ -29,12 +30,14 @@ pub fn open(
     warn: &mut dyn FnMut(&str),
 ) -> Result<Box<dyn Backend>, CliError> {
     let mut packed = Packed::new(scene, seed).map_err(|error| CliError::Scene(error.to_string()))?;
+    let mut seen = None;
     if with_pilot {
         pilot::run(&mut packed, sharing);
+        seen = Seen::find(&mut packed);
     }
     packed.warnings.iter().for_each(|warning| warn(warning));
     if choice == "reference" {
-        return Ok(Box::new(reference::Renderer::new(packed)));
+        return Ok(with_seen(reference::Renderer::new(packed), seen));
     }
     let choice = match (choice, choice.parse()) {
         ("auto", _) => DeviceChoice::Best,
@@ -42,7 +45,14 @@ pub fn open(
         (name, Err(_)) => DeviceChoice::Name(name.to_owned()),
     };
     let device = Device::open(&choice).map_err(device_error)?;
-    Ok(Box::new(gpu::Renderer::new(&device, &packed).map_err(device_error)?))
+    Ok(with_seen(gpu::Renderer::new(&device, &packed).map_err(device_error)?, seen))
+}
+
+fn with_seen(device: impl Backend + 'static, seen: Option<Seen>) -> Box<dyn Backend> {
+    match seen {
+        Some(seen) => Box::new(WithSeen { device, seen }),
+        None => Box::new(device),
+    }
 }
 
 /// The tables of a scene, as [`open`] would upload them.

@@ -102,6 +102,8 @@ pub struct Features {
     pub sealed: bool,
     /// Pixels that share their paths: 4 or 8, or 0 where each pixel has only its own.
     pub sharers: u32,
+    /// The light of lamps that the camera sees is found apart, for some pixels ([`crate::seen`]).
+    pub seen: bool,
     /// Copies of the tree: 8 or 1.
     pub node_copies: u32,
     /// Primitives in the tree; without, all stand in the kernel.
@@ -182,6 +184,7 @@ impl Features {
             rr_depth,
             pilot: false,
             sharers: 0,
+            seen: false,
             sealed: packed.media.iter().any(|medium| medium.grids & MEDIUM_SEALED != 0),
             node_copies: packed.bvh.copies,
             tree: packed.immediate_count < packed.primitives.len(),
@@ -286,6 +289,7 @@ impl Features {
             ("HAS_PILOT", self.pilot),
             ("HAS_SEALED", self.sealed),
             ("HAS_SHARING", self.sharers > 0),
+            ("HAS_SEEN", self.seen),
         ]
         .map(|(name, value)| format!("const bool {name} = {value};\n"))
         .concat();

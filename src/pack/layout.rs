@@ -418,6 +418,14 @@ gpu_struct! {
         pilot_scale: Vec3,
         /// Index of the first number of the pilot's blocks of pixels: of each one over the square of its radiance, and one that fills up.
         first_block: u32,
+        /// Where lamps are found apart, index of the first of as many numbers as the crop window has pixels: 1 where paths leave them out.
+        first_seen: u32,
+        /// Fills the last sixteen bytes.
+        unused_1: u32,
+        /// The same.
+        unused_2: u32,
+        /// The same.
+        unused_3: u32,
     }
 }
 

@@ -342,6 +342,7 @@ const EMPTY_FEATURES: Features = Features {
     rr_depth: 0,
     pilot: false,
     sharers: 0,
+    seen: false,
     sealed: false,
     node_copies: 8,
     tree: true,

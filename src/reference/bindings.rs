@@ -155,6 +155,8 @@ pub struct Params {
     pub first_cell: u32,
     pub pilot_scale: DVec3,
     pub first_block: u32,
+    /// See [`layout::Params`].
+    pub first_seen: u32,
     pub block_side: u32,
     pub block_columns: u32,
     pub sample_area_begin: DVec2,
@@ -321,6 +323,7 @@ impl From<&layout::Params> for Params {
             first_cell: from.first_cell,
             pilot_scale: from.pilot_scale.as_dvec3(),
             first_block: from.first_block,
+            first_seen: from.first_seen,
             block_side: from.block_side,
             block_columns: from.block_columns,
             sample_area_begin: from.sample_area_begin.as_dvec2(),

@@ -88,10 +88,20 @@ pub fn slide_color(tables: &Tables, light: &Light, point: DVec3, direction: DVec
     eval_texture(&tables.textures[light.texture as usize - 1], &tables.values, place)
 }
 
+/// Whether what a camera ray finds of lamps is left to other rays ([`crate::seen`]).
+fn seen_apart(tables: &Tables, pixel: u32) -> bool {
+    let params = &tables.params;
+    let (row, column) = (pixel / params.film_width - params.crop_y, pixel % params.film_width - params.crop_x);
+    tables.values[(params.first_seen + row * params.crop_width + column) as usize] > 0.0
+}
+
 /// Adds what a primitive emits towards the path.
 pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: f64, normal: DVec3) {
     let cos_light = -path.direction.dot(normal);
     if primitive.light == 0 || cos_light <= 0.0 || !emitters_seen(tables, path) {
+        return;
+    }
+    if tables.features.seen && path.depth == 0 && seen_apart(tables, path.pixel) {
         return;
     }
     let light: &Light = &tables.lights[primitive.light as usize - 1];
