@@ -32,8 +32,10 @@ use rayon::prelude::*;
 const FEW_PATHS_PER_BLOCK: u32 = 4;
 /// The part of a render's variance before the second vertex is stratified so much better than that of the pilot.
 const DIRECT_STRATIFIED: f64 = 4.0;
-/// A group of M pixels has the variance of M to this power paths of one's own (measured: .65 to .76).
-const ALIKE_EXPONENT: f64 = 0.7;
+/// What a group of M pixels shares has the variance of so many times M to this power paths of one's own, as the image is put together
+/// from it (measured: 1.9 to 2.4, and .2 to .4).
+const ALIKE: f64 = 2.0;
+const ALIKE_EXPONENT: f64 = 0.35;
 /// What keeping paths and summing up costs, in units of a path (measured: .25 to .35).
 const SHARE_COST: f64 = 0.35;
 /// A connection's ray takes this share of the time of a path's own ray, which has more to decide (measured: .4 to .5).
@@ -122,29 +124,10 @@ pub fn run(packed: &mut Packed, sharing: bool) {
     // Without a tree rays are so cheap that shorter paths hardly pay for the noise of their ends.
     // Light that comes through glass comes in rare, bright paths, of which a pilot has seen too few.
     let roulette = features.tree && !features.dielectric;
-    let equiangular = packed.media.iter().map(|medium| medium.equiangular).collect::<Vec<f32>>();
-    let broad = sharing && features.equiangular && has_broad_lamps_only(packed);
-    if broad {
-        set_equiangular(packed, &vec![0.0; equiangular.len()]);
-    }
-    let sharing = sharing && can_share_paths(&packed.features);
+    let sharing = sharing && can_share_paths(packed);
     if large && (roulette || sharing) && packed.primitives.len() <= MOST_PRIMITIVES {
         look_ahead(packed, sharing, roulette);
     }
-    if broad && packed.features.sharers == 0 {
-        set_equiangular(packed, &equiangular);
-    }
-}
-
-/// Whether all lamps are so broad that light does not come from near them alone. Sharing paths is worth more there than equiangular distances.
-fn has_broad_lamps_only(packed: &Packed) -> bool {
-    let least = BROAD_AREA * (2.0 * packed.frame.radius as f32).powi(2);
-    packed.lights.iter().filter(|light| is_near(light)).all(|light| light.area > least)
-}
-
-fn set_equiangular(packed: &mut Packed, shares: &[f32]) {
-    packed.media.iter_mut().zip(shares).for_each(|(medium, share)| medium.equiangular = *share);
-    packed.features.equiangular = shares.iter().any(|share| *share > 0.0);
 }
 
 fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
@@ -162,10 +145,18 @@ fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
     }
 }
 
-/// Whether the kernels can connect paths of different pixels in such a scene: the densities of equiangular distances depend on more than
-/// the two ends, and light through voxels and masks is known by chance only.
-pub fn can_share_paths(features: &Features) -> bool {
-    features.light_sampling && !features.equiangular && !features.grids && !features.masks
+/// Whether the kernels can connect paths of different pixels in such a scene, and do it well: light through voxels and masks is known by
+/// chance only; and what goes by small lamps in fog must do so at all its vertices.
+pub fn can_share_paths(packed: &Packed) -> bool {
+    let features = &packed.features;
+    let spread = !features.equiangular || has_broad_lamps_only(packed);
+    features.light_sampling && spread && !features.grids && !features.masks
+}
+
+/// Whether all lamps are so broad that light does not come from near them alone.
+fn has_broad_lamps_only(packed: &Packed) -> bool {
+    let least = BROAD_AREA * (2.0 * packed.frame.radius as f32).powi(2);
+    packed.lights.iter().filter(|light| is_near(light)).all(|light| light.area > least)
 }
 
 /// Follows one path for each block, and again until there are enough. The order of the result does not depend on the threads.
@@ -310,7 +301,7 @@ impl View {
 
 /// As how many paths of its own a pixel has those of its group.
 fn alike(sharers: u32) -> f64 {
-    f64::from(sharers.max(1)).powf(ALIKE_EXPONENT)
+    if sharers == 0 { 1.0 } else { ALIKE * f64::from(sharers).powf(ALIKE_EXPONENT) }
 }
 
 impl Found {

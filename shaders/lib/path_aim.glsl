@@ -33,7 +33,9 @@ vec3 light_pivot(Light light, vec2 u) {
 Aim find_aim(Path path, Vertex vertex) {
     Aim aim = Aim(vec3(0.0, 0.0, 1.0), 0.0, 0.0);
     bool may = vertex.in_medium || !HAS_DIELECTRIC || (vertex.surface.flags & SURFACE_ORIENTED) == 0u;
-    if (HAS_EQUIANGULAR && may && MEDIUM(valid_medium(path.medium)).equiangular > 0.0) {
+    // Nor where others take part in the direction's density: see lib/path_share.glsl.
+    bool connects = HAS_SHARING && (path.sharing == 1u && path.depth == 1u || path.sharing == 2u && path.depth == 2u && vertex.in_medium);
+    if (HAS_EQUIANGULAR && may && !connects && MEDIUM(valid_medium(path.medium)).equiangular > 0.0) {
         // The next segment's numbers: its distances go by the same point.
         vec4 v = sample_set(path, PIVOT_SET + path.segment + 1u);
         Light light = LIGHT(choose_light(v.x));

@@ -26,7 +26,7 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
     FlightEnd end = FlightEnd(!surface && t_end < path.far_end, t_end - path.t_min, medium.albedo, t_end - path.t_min);
     float sigma = HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x;
     float way = t_end - path.t_min;
-    bool mixed = HAS_EQUIANGULAR && medium.equiangular > 0.0;
+    bool mixed = goes_by_lamps(path, medium);
     if (mixed) {
         end.scatters = path.tau_left < sigma * way;
     }

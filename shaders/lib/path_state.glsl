@@ -141,6 +141,13 @@ float channel_of(vec3 v, uint channel) {
     return channel == 0u ? v.x : (channel == 1u ? v.y : v.z);
 }
 
+// Whether the flight's distance goes by lamps as well. Not from the first vertex to the second of a path that is shared: its density must
+// be known from the two alone.
+bool goes_by_lamps(Path path, Medium medium) {
+    bool connects = HAS_SHARING && path.sharing == 1u && path.depth == 1u;
+    return HAS_EQUIANGULAR && medium.equiangular > 0.0 && !connects;
+}
+
 // Distance to the end of the flight with the extinction that holds from t_min on.
 float flight_end(Path path) {
     if (!HAS_MEDIA) {
@@ -153,7 +160,7 @@ float flight_end(Path path) {
     vec3 sigma_t = medium.sigma_t;
     float sigma = HAS_CHROMATIC ? channel_of(sigma_t, path.channel) : sigma_t.x;
     float flight = free_flight(path.tau_left, sigma);
-    if (HAS_EQUIANGULAR && medium.equiangular > 0.0) {
+    if (goes_by_lamps(path, medium)) {
         flight = free_flight(MAX_FLIGHT_TAU, medium.least_sigma_t);
     }
     return min(path.t_min + flight, path.far_end);

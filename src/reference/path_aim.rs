@@ -40,7 +40,9 @@ pub fn light_pivot(light: &Light, u: DVec2) -> DVec3 {
 pub fn find_aim(tables: &Tables, path: &Path, vertex: &Vertex) -> Aim {
     let mut aim = Aim { axis: DVec3::Z, share: 0.0, u: 0.0 };
     let may = vertex.in_medium || vertex.surface.flags & SURFACE_ORIENTED == 0;
-    if may && medium_at(tables, path.medium).equiangular > 0.0 {
+    let second = path.sharing == 2 && path.depth == 2 && vertex.in_medium;
+    let shared = path.sharing == 1 && path.depth == 1 || second;
+    if may && !shared && medium_at(tables, path.medium).equiangular > 0.0 {
         let mut v = sample_set(tables, path, PIVOT_SET + path.segment + 1);
         let light = &tables.lights[choose_light(tables, &mut v.x) as usize];
         let way = light_pivot(light, v.zw()) - vertex.point;

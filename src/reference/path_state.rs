@@ -199,13 +199,19 @@ pub fn medium_at(tables: &Tables, medium: u32) -> &Medium {
     tables.media.get(medium as usize).unwrap_or(&tables.media[0])
 }
 
+/// Whether the flight's distance goes by lamps as well. Not from the first vertex to the second of a path that is shared: its density
+/// must be known from the two alone.
+pub fn goes_by_lamps(path: &Path, medium: &Medium) -> bool {
+    medium.equiangular > 0.0 && !(path.sharing == 1 && path.depth == 1)
+}
+
 /// Distance to the end of the flight with the extinction that holds from `t_min` on.
 pub fn flight_end(tables: &Tables, path: &Path) -> f64 {
     let medium = medium_at(tables, path.medium);
     if medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT) != 0 {
         return path.far_end;
     }
-    let flight = if medium.equiangular > 0.0 {
+    let flight = if goes_by_lamps(path, medium) {
         free_flight(MAX_FLIGHT_TAU, medium.least_sigma_t)
     } else {
         free_flight(path.tau_left, medium.sigma_t[path.channel as usize])
