@@ -83,6 +83,7 @@ fn unsafe_outside_gpu(sources: &[Source]) -> Vec<String> {
 const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("sampler", &["rng"]),
     ("bsdf", &["math", "warp"]),
+    ("principled", &["bsdf", "math", "warp"]),
     ("light", &["math", "warp"]),
     ("sky", &["math"]),
     ("medium", &["math"]),
@@ -90,7 +91,7 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("path_state", &["math", "sampler", "medium", "light", "grid"]),
     ("path_surface", &["path_state", "texture", "bsdf"]),
     ("equiangular", &["math"]),
-    ("path_vertex", &["path_state", "path_surface", "warp", "ray", "phase", "bsdf"]),
+    ("path_vertex", &["path_state", "path_surface", "warp", "ray", "phase", "bsdf", "principled"]),
     ("toward_light", &["math"]),
     ("path_aim", &["path_state", "path_vertex", "light", "toward_light"]),
     ("path_lights", &["path_state", "path_vertex", "path_aim", "light", "sky", "grid", "texture"]),

@@ -53,7 +53,7 @@ pub struct Features {
     pub many_lights: bool,
     /// A surface whose back is black.
     pub one_sided: bool,
-    /// Glass, smooth or rough.
+    /// Glass, smooth or rough, or another surface that refracts.
     pub dielectric: bool,
     /// Metal, smooth or rough.
     pub conductor: bool,
@@ -61,6 +61,8 @@ pub struct Features {
     pub plastic: bool,
     /// A diffuse body under a rough varnish.
     pub rough_plastic: bool,
+    /// The principled BSDF.
+    pub principled: bool,
     /// Colours or an opacity that depend on the place.
     pub textures: bool,
     /// Roughness that depends on the direction.
@@ -148,10 +150,11 @@ impl Features {
             envmaps: kind(LIGHT_ENVMAP),
             many_lights: packed.lights.len() > 1,
             one_sided: packed.surfaces.iter().any(|surface| surface.flags & SURFACE_TWO_SIDED == 0),
-            dielectric: bsdf(BSDF_DIELECTRIC),
+            dielectric: bsdf(BSDF_DIELECTRIC) || flag(SURFACE_ORIENTED),
             conductor: bsdf(BSDF_CONDUCTOR),
             plastic: bsdf(BSDF_PLASTIC),
             rough_plastic: packed.surfaces.iter().any(|surface| surface.value_count != 0),
+            principled: bsdf(BSDF_PRINCIPLED),
             textures: packed.surfaces.iter().any(|surface| {
                 surface.textures_1 | surface.textures_2 | surface.share_texture | surface.relief_texture != 0
             }),
@@ -218,6 +221,7 @@ impl Features {
             conductor: true,
             plastic: true,
             rough_plastic: true,
+            principled: true,
             textures: true,
             anisotropic: true,
             shading_normals: true,
@@ -264,8 +268,9 @@ impl Features {
             ("HAS_DIELECTRIC", self.dielectric),
             ("HAS_CONDUCTOR", self.conductor),
             ("HAS_PLASTIC", self.plastic),
-            ("HAS_LOBES", self.dielectric || self.conductor || self.plastic),
+            ("HAS_LOBES", self.dielectric || self.conductor || self.plastic || self.principled),
             ("HAS_ROUGH_PLASTIC", self.rough_plastic),
+            ("HAS_PRINCIPLED", self.principled),
             ("HAS_TEXTURES", self.textures),
             ("HAS_ANISOTROPIC", self.anisotropic),
             ("HAS_UVS", self.textures || self.anisotropic),

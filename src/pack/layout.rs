@@ -489,6 +489,8 @@ pub const BSDF_DIELECTRIC: u32 = 1;
 pub const BSDF_CONDUCTOR: u32 = 2;
 /// Kind of BSDF: a diffuse body under a smooth or rough varnish.
 pub const BSDF_PLASTIC: u32 = 3;
+/// Kind of BSDF: the principled one, whose parameters stand where `lib/principled.glsl` says.
+pub const BSDF_PRINCIPLED: u32 = 4;
 /// [`Phase::kind`]: Henyey and Greenstein's.
 pub const PHASE_HENYEY_GREENSTEIN: u32 = 0;
 /// [`Phase::kind`]: Rayleigh's.
@@ -594,6 +596,7 @@ pub fn glsl() -> String {
         ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),
         ("BSDF_CONDUCTOR", BSDF_CONDUCTOR),
         ("BSDF_PLASTIC", BSDF_PLASTIC),
+        ("BSDF_PRINCIPLED", BSDF_PRINCIPLED),
         ("PHASE_HENYEY_GREENSTEIN", PHASE_HENYEY_GREENSTEIN),
         ("PHASE_RAYLEIGH", PHASE_RAYLEIGH),
         ("PHASE_TABULATED", PHASE_TABULATED),

@@ -59,6 +59,7 @@ fn pack_part(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) ->
                 ..rough(smooth, roughness)
             }
         }
+        Bsdf::Principled { parameters, two_sided } => super::principled::pack(parameters, *two_sided, color),
         // What is left is nothing at all, or has parts that `pack_chain` puts together.
         Bsdf::Null | Bsdf::Mask { .. } | Bsdf::Blend { .. } | Bsdf::Sides { .. } | Bsdf::Relief { .. } => hole(),
     }
@@ -143,6 +144,7 @@ pub fn lets_shadow_rays_through(bsdf: &Bsdf) -> bool {
             | Bsdf::RoughConductor { .. }
             | Bsdf::Plastic { .. }
             | Bsdf::RoughPlastic { .. }
+            | Bsdf::Principled { .. }
     );
     !opaque
 }
@@ -161,12 +163,12 @@ fn hole() -> Surface {
     Surface { flags: SURFACE_TWO_SIDED | SURFACE_MASK, opacity: 0.0, ..Surface::default() }
 }
 
-fn side(two_sided: bool) -> u32 {
+pub(super) fn side(two_sided: bool) -> u32 {
     if two_sided { SURFACE_TWO_SIDED } else { 0 }
 }
 
 /// A colour, and its texture.
-type Color = (Vec3, u32);
+pub(super) type Color = (Vec3, u32);
 
 fn glass(eta: f64, [reflectance, transmittance]: [Color; 2], flags: u32) -> Surface {
     Surface {

@@ -16,6 +16,7 @@ pub mod lights;
 pub mod material;
 pub mod nesting;
 pub mod phase;
+mod principled;
 pub mod sealed;
 pub mod sky;
 pub mod slide;
@@ -322,6 +323,7 @@ const EMPTY_FEATURES: Features = Features {
     conductor: false,
     plastic: false,
     rough_plastic: false,
+    principled: false,
     textures: false,
     anisotropic: false,
     shading_normals: false,
