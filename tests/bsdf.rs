@@ -126,6 +126,8 @@ fn rough_surfaces() -> Vec<(String, Surface, f64)> {
             let name = |kind: &str| format!("{kind}, {roughness}, {metallic}, {spec_trans}, cosine {cosine}");
             if cosine > 0.0 || spec_trans > 0.0 {
                 all.push((name("principled"), surface, cosine));
+            }
+            if cosine == 0.3 {
                 all.push((name("brushed principled"), Surface { alpha: 1.5, ..brushed(surface, 0.6) }, cosine));
             }
         }

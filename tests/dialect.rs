@@ -6,6 +6,7 @@ mod common;
 use common::images::{Image, average, by_reference, on_device};
 use common::scenes::{from_file, pack};
 use glam::DVec3;
+use tyndall::pack::layout::Surface;
 
 /// The largest difference of a channel, beyond `relative` of what is expected.
 fn excess(image: &Image, expected: &[[f64; 3]], relative: f64) -> f64 {
@@ -99,4 +100,52 @@ fn pictures_in_front_of_lamps_and_colours_of_meshes() {
     }
     let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
     assert!((average(&device) - average(&reference)).abs().max_element() < 1e-3);
+}
+
+#[rustfmt::skip]
+const PRINCIPLED: [[f64; 3]; 24] = [
+    [0.1865, 0.2092, 0.2477], [0.1776, 0.1957, 0.2326], [0.2140, 0.2177, 0.2228], [0.1712, 0.1692, 0.1853],
+    [0.1602, 0.1635, 0.1847], [0.1657, 0.1658, 0.1744], [0.2096, 0.1812, 0.1657], [0.1764, 0.1753, 0.1922],
+    [0.1644, 0.1864, 0.2223], [0.1636, 0.2054, 0.2624], [0.1505, 0.1690, 0.1994], [0.1602, 0.1756, 0.1967],
+    [0.1751, 0.1769, 0.1915], [0.1503, 0.1526, 0.1727], [0.1315, 0.1624, 0.2120], [0.2632, 0.2434, 0.2348],
+    [0.1916, 0.1937, 0.2143], [0.1660, 0.2572, 0.3634], [0.2059, 0.2761, 0.3443], [0.1920, 0.2894, 0.3901],
+    [0.2000, 0.3000, 0.3999], [0.1894, 0.2028, 0.2312], [0.1448, 0.1627, 0.2051], [0.1705, 0.2402, 0.3091],
+];
+
+#[rustfmt::skip]
+const CLEAR: [[f64; 3]; 24] = [
+    [0.1755, 0.1896, 0.1713], [0.1606, 0.1763, 0.1573], [0.1637, 0.2019, 0.2107], [0.2228, 0.2886, 0.2747],
+    [0.2268, 0.2944, 0.2803], [0.2269, 0.2979, 0.2923], [0.1622, 0.1655, 0.1301], [0.1489, 0.1566, 0.1254],
+    [0.1491, 0.1759, 0.1712], [0.2127, 0.2892, 0.3128], [0.2155, 0.2872, 0.2963], [0.2190, 0.2943, 0.3075],
+    [0.1560, 0.1705, 0.1486], [0.1406, 0.1500, 0.1209], [0.1399, 0.1652, 0.1594], [0.1946, 0.2021, 0.1845],
+    [0.1593, 0.1553, 0.1072], [0.1738, 0.2502, 0.3159], [0.1902, 0.2737, 0.3497], [0.1957, 0.2895, 0.3805],
+    [0.2000, 0.3000, 0.3999], [0.1546, 0.1598, 0.1255], [0.1425, 0.1486, 0.1015], [0.1534, 0.2146, 0.2563],
+];
+
+#[test]
+fn principled_surfaces_look_as_in_mitsuba() {
+    for (material, expected) in [("principled", &PRINCIPLED), ("clear", &CLEAR)] {
+        let parameters = [("material", material)];
+        let packed = pack(&from_file("surfaces.xml", &parameters), 5);
+        assert!(packed.features.principled);
+        assert_eq!(packed.features.dielectric, material == "clear");
+        let device = on_device(&packed, 8192);
+        // Standard errors of Mitsuba's pixels are up to 0.0004.
+        let far = excess(&device, expected, 0.005);
+        assert!(far < 1.5e-3, "{material}: {far}");
+        // The planted faults: another brightness, and surfaces a little rougher or with less of a coat.
+        assert!(excess(&device, &brighter(expected, 1.03), 0.005) > 1.5e-3);
+        let rough = |surface: &mut Surface| {
+            (surface.alpha, surface.alpha_v) = (2.0 * surface.alpha, 2.0 * surface.alpha_v);
+        };
+        for change in [rough as fn(&mut Surface), |surface| surface.internal_reflectance = 0.0] {
+            let mut wrong = packed.clone();
+            wrong.surfaces.iter_mut().for_each(change);
+            let far = excess(&on_device(&wrong, 4096), expected, 0.005);
+            assert!(far > 3e-3, "{material}: {far}");
+        }
+        let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
+        let apart = device.iter().zip(&reference).filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count();
+        assert!(apart <= 2, "{material}: {apart} pixels differ");
+    }
 }
