@@ -67,6 +67,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Channels that are written beside the radiance.
     pub aovs: Vec<Aov>,
+    /// Name of the channels with second moments of the samples, if these are asked for.
+    pub moments: Option<String>,
     /// Samples a pixel that the scene asks for; the command line may ask for others.
     pub sample_count: u32,
 }
@@ -82,6 +84,7 @@ impl Scene {
             media: Vec::new(),
             lights: Vec::new(),
             aovs: Vec::new(),
+            moments: None,
             sample_count: 16,
         }
     }
