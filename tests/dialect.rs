@@ -6,7 +6,9 @@ mod common;
 use common::images::{Image, average, by_reference, on_device};
 use common::scenes::{from_file, pack};
 use glam::DVec3;
+use std::path::Path;
 use tyndall::pack::layout::Surface;
+use tyndall::scene::{Scene, mitsuba};
 
 /// The largest difference of a channel, beyond `relative` of what is expected.
 fn excess(image: &Image, expected: &[[f64; 3]], relative: f64) -> f64 {
@@ -40,6 +42,24 @@ const DIM_BUBBLE: [[f64; 3]; 24] = [
 ];
 
 #[rustfmt::skip]
+const TINTED_BUBBLE: [[f64; 3]; 24] = [
+    [0.3000, 0.3000, 0.3000], [0.2878, 0.2631, 0.2554], [0.2770, 0.1553, 0.1189], [0.7341, 0.6575, 0.6856], [0.3221, 0.2882, 0.2797],
+    [0.3000, 0.3000, 0.3000], [0.3000, 0.3000, 0.3000], [0.2387, 0.1455, 0.1179], [0.2280, 0.0903, 0.0513], [0.2726, 0.1039, 0.0522],
+    [0.2860, 0.1577, 0.1189], [0.3000, 0.3000, 0.3000], [0.2903, 0.2905, 0.2908], [0.2114, 0.1275, 0.1026], [0.1801, 0.0733, 0.0428],
+    [0.1885, 0.0803, 0.0460], [0.2448, 0.1463, 0.1171], [0.3000, 0.3000, 0.3000], [0.1628, 0.1581, 0.1577], [0.1536, 0.1277, 0.1200],
+    [0.1331, 0.0605, 0.0392], [0.1439, 0.0700, 0.0485], [0.2277, 0.2121, 0.2161], [0.2525, 0.2663, 0.2832],
+];
+
+#[rustfmt::skip]
+const GREEN_BUBBLE: [[f64; 3]; 24] = [
+    [0.3000, 0.3000, 0.3000], [0.2557, 0.2802, 0.2543], [0.1208, 0.2367, 0.1137], [0.5410, 0.7599, 0.6792], [0.2742, 0.3142, 0.2780],
+    [0.3000, 0.3000, 0.3000], [0.3000, 0.3000, 0.3000], [0.1192, 0.2069, 0.1138], [0.0538, 0.1723, 0.0462], [0.0558, 0.2120, 0.0463],
+    [0.1208, 0.2435, 0.1134], [0.3000, 0.3000, 0.3000], [0.2902, 0.2906, 0.2908], [0.1029, 0.1824, 0.0987], [0.0434, 0.1358, 0.0387],
+    [0.0464, 0.1470, 0.0427], [0.1150, 0.2121, 0.1125], [0.3000, 0.3000, 0.3000], [0.1527, 0.1635, 0.1568], [0.1161, 0.1455, 0.1174],
+    [0.0374, 0.1028, 0.0340], [0.0442, 0.1147, 0.0428], [0.1869, 0.2305, 0.2128], [0.2460, 0.2681, 0.2825],
+];
+
+#[rustfmt::skip]
 const SLIDES: [[f64; 3]; 54] = [
     [0.3654, 0.2375, 0.2445], [0.5259, 0.3420, 0.5215], [0.4311, 0.2827, 0.3227], [0.1684, 0.1397, 0.0506],
     [0.1201, 0.1049, 0.0771], [0.0363, 0.0630, 0.1102], [0.0030, 0.0030, 0.0042], [0.0000, 0.0000, 0.0000],
@@ -59,9 +79,15 @@ const SLIDES: [[f64; 3]; 54] = [
 
 #[test]
 fn light_passes_panes_without_an_event() {
-    for (parameters, expected) in [(&[][..], &BUBBLE), (&[("factor", "0.6"), ("depth", "3")][..], &DIM_BUBBLE)] {
+    for (parameters, expected) in [
+        (&[][..], &BUBBLE),
+        (&[("factor", "0.6"), ("depth", "3")][..], &DIM_BUBBLE),
+        (&[("factor", "0.9, 0.5, 0.2")][..], &TINTED_BUBBLE),
+        (&[("factor", "0.2, 0.9, 0"), ("depth", "3")][..], &GREEN_BUBBLE),
+    ] {
         let packed = pack(&from_file("panes.xml", parameters), 5);
         assert!(packed.features.panes);
+        assert_eq!(packed.features.tints, parameters.iter().any(|(_, value)| value.contains(',')));
         let device = on_device(&packed, 16384);
         // Standard errors of Mitsuba's pixels are up to 0.0024, where the lamp is seen as a reflection.
         let far = excess(&device, expected, 0.02);
@@ -147,5 +173,56 @@ fn principled_surfaces_look_as_in_mitsuba() {
         let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
         let apart = device.iter().zip(&reference).filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count();
         assert!(apart <= 2, "{material}: {apart} pixels differ");
+    }
+}
+
+/// What a camera sees through a pane of a colour, which reflects nothing, and a medium that absorbs and glows, before a white sky.
+fn through_a_pane(color: &str, medium: &str) -> Scene {
+    let text = format!(
+        r#"<scene version="3.0.0"><integrator type="volpath"><integer name="max_depth" value="2"/></integrator>
+        <sensor type="perspective"><float name="fov" value="0.5"/>
+            <transform name="to_world"><lookat origin="0 0 5" target="0 0 0" up="0 1 0"/></transform>
+            <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/><rfilter type="box"/></film>
+        </sensor>
+        <shape type="rectangle"><transform name="to_world"><translate z="3"/></transform>
+            <bsdf type="thindielectric"><float name="int_ior" value="1"/><float name="ext_ior" value="1"/>{color}</bsdf></shape>
+        <shape type="cube"><bsdf type="null"/>{medium}</shape>
+        <emitter type="constant"><rgb name="radiance" value="1"/></emitter></scene>"#
+    );
+    mitsuba::parse_str(&text, Path::new("scene.xml"), &[]).unwrap().scene
+}
+
+#[test]
+fn panes_take_their_colour_from_what_is_behind() {
+    let (sigma_t, emission) = (DVec3::new(0.2, 0.5, 1.0), DVec3::new(0.5, 0.3, 0.9));
+    let glow = r#"<rgb name="emission" value="0.5, 0.3, 0.9"/><rgb name="albedo" value="0"/>"#;
+    let plain = format!(
+        r#"<medium name="interior" type="homogeneous"><rgb name="sigma_t" value="0.2, 0.5, 1"/>{glow}</medium>"#
+    );
+    let constant = |color: &str| format!(r#"<rgb name="specular_transmittance" value="{color}"/>"#);
+    let texture = |color: &str| {
+        format!(
+            r#"<texture type="checkerboard" name="specular_transmittance"><rgb name="color0" value="{color}"/><rgb name="color1" value="{color}"/></texture>"#
+        )
+    };
+    // Radiance through 2 units of length: what comes from behind, and what is added on the way.
+    let left = (-2.0 * sigma_t).exp();
+    let behind = left + emission / sigma_t * (DVec3::ONE - left);
+    for (text, color) in [
+        ("0.9, 0.5, 0.2", DVec3::new(0.9, 0.5, 0.2)),
+        ("0, 0.3, 1", DVec3::new(0.0, 0.3, 1.0)),
+        ("0.5, 0.5, 0.5", DVec3::splat(0.5)),
+    ] {
+        for (kind, transmittance) in [("constant", constant(text)), ("texture", texture(text))] {
+            let packed = pack(&through_a_pane(&transmittance, &plain), 3);
+            assert_eq!(packed.features.tints, kind == "texture" || text != "0.5, 0.5, 0.5");
+            let expected = color * behind;
+            for (name, image) in [("device", on_device(&packed, 4096)), ("reference", by_reference(&packed, 2048))] {
+                let mean = average(&image);
+                let agrees = |factor: f64| (mean - expected * factor).abs().max_element() < 4e-3;
+                assert!(agrees(1.0), "{name}, {kind} {text}: {mean}, expected {expected}");
+                assert!(!agrees(1.03) && !agrees(0.97), "{name}: the comparison is blind");
+            }
+        }
     }
 }

@@ -89,7 +89,7 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("medium", &["math"]),
     ("grid", &["math", "rng"]),
     ("path_state", &["math", "sampler", "medium", "light", "grid"]),
-    ("path_surface", &["path_state", "texture", "bsdf"]),
+    ("path_surface", &["path_state", "math", "texture", "bsdf"]),
     ("equiangular", &["math"]),
     ("path_vertex", &["path_state", "path_surface", "warp", "ray", "phase", "bsdf", "principled"]),
     ("toward_light", &["math"]),

@@ -1,5 +1,6 @@
 // What a surface is at a point: texture coordinates, colours, opacity, and the frame of its BSDF.
 #include "lib/path_state.glsl"
+#include "lib/math.glsl"
 #include "lib/texture.glsl"
 #include "lib/bsdf.glsl"
 
@@ -38,6 +39,27 @@ vec3 shading_normal(uint index, vec2 barycentric, vec3 normal) {
     return squared > 0.0 ? sum * inversesqrt(squared) : normal;
 }
 
+// Optical depth at which a share is left. What is not there at all is out of reach for any flight.
+float color_depth(float share) {
+    return share > 1e-30 ? minus_log(min(share, 1.0)) : 1000.0;
+}
+
+// What a thin pane leaves of the light that it does not reflect.
+vec3 pane_transmittance(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric) {
+    uint texture = surface.textures_2 & 0xffffu;
+    if (HAS_TEXTURES && texture != 0u) {
+        return eval_texture(TEXTURE(texture - 1u), texture_coordinates(primitive, index, point, barycentric));
+    }
+    return surface.transmittance;
+}
+
+// The colour of a thin pane as an optical depth of each channel, 0 for the one that it leaves the most of: of the rest `opacity_at` knows.
+vec3 pane_depth(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric) {
+    vec3 color = pane_transmittance(surface, primitive, index, point, barycentric);
+    vec3 share = color / max(max_component(color), 1e-30);
+    return vec3(color_depth(share.x), color_depth(share.y), color_depth(share.z));
+}
+
 // Probability that light in a direction meets a surface that it may also pass: a mask, or a thin pane, of which `opacity` says how
 // much of the light is left that it does not reflect.
 float opacity_at(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric, vec3 direction) {
@@ -46,7 +68,11 @@ float opacity_at(Surface surface, Primitive primitive, uint index, vec3 point, v
         if (HAS_SHADING_NORMALS && (surface.flags & SURFACE_SMOOTH) != 0u) {
             normal = shading_normal(index, barycentric, normal);
         }
-        return 1.0 - (1.0 - pane_reflectance(dot(normal, direction), surface.eta)) * surface.opacity;
+        float most = surface.opacity;
+        if (HAS_TINTS && (surface.textures_2 & 0xffffu) != 0u) {
+            most = max_component(pane_transmittance(surface, primitive, index, point, barycentric));
+        }
+        return 1.0 - (1.0 - pane_reflectance(dot(normal, direction), surface.eta)) * most;
     }
     uint texture = surface.textures_2 >> 16;
     if (HAS_TEXTURES && texture != 0u) {
@@ -67,6 +93,9 @@ void apply_textures(inout Surface surface, vec2 uv) {
     }
     if (transmittance != 0u) {
         surface.transmittance = eval_texture(TEXTURE(transmittance - 1u), uv);
+        if (HAS_TINTS && (surface.flags & SURFACE_PANE) != 0u) {
+            surface.opacity = max_component(surface.transmittance);
+        }
     }
 }
 

@@ -73,6 +73,8 @@ pub struct Features {
     pub masks: bool,
     /// Thin panes, which light passes as it passes holes.
     pub panes: bool,
+    /// Thin panes of a colour; they count among chromatic media.
+    pub tints: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
     /// Surfaces with more than one BSDF.
@@ -115,7 +117,11 @@ impl Features {
     pub fn of(scene: &Scene, packed: &Packed) -> Features {
         let Integrator { max_depth, rr_depth, hide_emitters } = scene.integrator;
         let emission = packed.media.iter().any(|medium| medium.emission != glam::Vec3::ZERO);
-        let media = emission || packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
+        let tints = packed.surfaces.iter().any(|surface| {
+            let colored = surface.transmittance != glam::Vec3::splat(surface.transmittance.x);
+            surface.flags & SURFACE_PANE != 0 && (colored || surface.textures_2 & 0xffff != 0)
+        });
+        let media = tints || emission || packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
         let lowest = (1 << LIGHT_TEXTURE_SHIFT) - 1;
         let kind = |kind: u32| packed.lights.iter().any(|light| light.kind & lowest == kind);
         let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
@@ -124,7 +130,8 @@ impl Features {
         let max_depth = max_depth.unwrap_or(u32::MAX);
         Features {
             media,
-            chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x))
+            chromatic: tints
+                || packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x))
                 || scene.media.iter().any(|medium| match &medium.volumes.sigma_t {
                     Some(Volume::Grid(field)) => field.grid.channels() == 3,
                     _ => false,
@@ -166,6 +173,7 @@ impl Features {
                 primitive.surface & PRIMITIVE_BOUNDARY == 0 && packed.surfaces[index as usize].flags & SURFACE_MASK != 0
             }),
             panes: flag(SURFACE_PANE),
+            tints,
             slides: packed.lights.iter().any(|light| light.texture != 0),
             far_clip: {
                 let eye = packed.params.camera_origin;
@@ -227,6 +235,7 @@ impl Features {
             shading_normals: true,
             masks: true,
             panes: true,
+            tints: true,
             slides: true,
             far_clip: true,
             tree: true,
@@ -277,6 +286,7 @@ impl Features {
             ("HAS_SHADING_NORMALS", self.shading_normals),
             ("HAS_MASK", self.masks),
             ("HAS_PANES", self.panes),
+            ("HAS_TINTS", self.tints),
             ("HAS_SLIDES", self.slides),
             ("HAS_FAR_CLIP", self.far_clip),
             ("HAS_BLENDS", self.blends),

@@ -119,16 +119,13 @@ pub fn pack_chain(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32
     }
 }
 
-/// The surfaces of a shape's BSDF, see [`pack_chain`]. Light that passes a pane of no colour goes on as if nothing had been there, as it does
+/// The surfaces of a shape's BSDF, see [`pack_chain`]. Light that passes a pane goes on as if nothing had been there, as it does
 /// through masks: that is no event, and shadow rays pass as well.
 pub fn pack_bsdf(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) -> Vec<Surface> {
     let mut chain = pack_chain(bsdf, textures, values);
-    if let Bsdf::ThinDielectric { specular_transmittance, .. } = bsdf
-        && let Some(transmittance) = specular_transmittance.constant()
-        && transmittance == DVec3::splat(transmittance.x)
-    {
+    if matches!(bsdf, Bsdf::ThinDielectric { .. }) {
         chain[0].flags |= SURFACE_PANE | SURFACE_MASK;
-        chain[0].opacity = transmittance.x as f32;
+        chain[0].opacity = chain[0].transmittance.max_element();
     }
     chain
 }

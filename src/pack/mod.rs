@@ -329,6 +329,7 @@ const EMPTY_FEATURES: Features = Features {
     shading_normals: false,
     masks: false,
     panes: false,
+    tints: false,
     slides: false,
     far_clip: false,
     blends: false,
