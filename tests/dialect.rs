@@ -60,6 +60,15 @@ const GREEN_BUBBLE: [[f64; 3]; 24] = [
 ];
 
 #[rustfmt::skip]
+const ATTRIBUTES: [[f64; 3]; 24] = [
+    [0.8557, 0.9639, 1.0743], [0.5157, 0.6272, 0.9453], [0.4307, 0.4191, 0.9834], [0.4019, 0.3890, 0.9793], [0.2052, 0.2073, 0.9915],
+    [0.3924, 0.4692, 1.0401], [0.4140, 0.6019, 0.7164], [0.4911, 0.4051, 0.7692], [0.2927, 0.2264, 0.8630], [0.3742, 0.1743, 0.8588],
+    [0.2148, 0.2093, 0.8859], [0.4496, 0.5898, 0.9628], [0.6400, 0.6985, 0.8960], [0.4580, 0.2974, 0.6531], [0.3074, 0.1776, 0.8525],
+    [0.3574, 0.1868, 0.8358], [0.1817, 0.2585, 0.8153], [0.4818, 0.7239, 0.8832], [0.8996, 0.9990, 1.0988], [0.6496, 0.5283, 0.8166],
+    [0.4205, 0.3152, 0.8034], [0.4031, 0.3187, 0.7759], [0.2866, 0.5363, 0.6030], [0.5818, 0.8269, 0.8907],
+];
+
+#[rustfmt::skip]
 const SLIDES: [[f64; 3]; 54] = [
     [0.3654, 0.2375, 0.2445], [0.5259, 0.3420, 0.5215], [0.4311, 0.2827, 0.3227], [0.1684, 0.1397, 0.0506],
     [0.1201, 0.1049, 0.0771], [0.0363, 0.0630, 0.1102], [0.0030, 0.0030, 0.0042], [0.0000, 0.0000, 0.0000],
@@ -94,6 +103,12 @@ fn light_passes_panes_without_an_event() {
         assert!(far < 6e-3, "{parameters:?}: {far}");
         // The planted faults: another brightness, and a path of one event less.
         assert!(excess(&device, &brighter(expected, 1.08), 0.02) > 6e-3);
+        if packed.features.tints {
+            // Another colour of the same brightness in one channel.
+            let mut wrong = packed.clone();
+            wrong.surfaces.iter_mut().for_each(|surface| surface.transmittance.y *= 0.9);
+            assert!(excess(&on_device(&wrong, 4096), expected, 0.02) > 6e-3, "{parameters:?}");
+        }
         let mut short = from_file("panes.xml", parameters);
         short.integrator.max_depth = short.integrator.max_depth.map(|depth| depth - 1);
         assert!(excess(&on_device(&pack(&short, 5), 1024), expected, 0.02) > 6e-3, "{parameters:?}");
@@ -208,12 +223,13 @@ fn panes_take_their_colour_from_what_is_behind() {
     // Radiance through 2 units of length: what comes from behind, and what is added on the way.
     let left = (-2.0 * sigma_t).exp();
     let behind = left + emission / sigma_t * (DVec3::ONE - left);
-    for (text, color) in [
-        ("0.9, 0.5, 0.2", DVec3::new(0.9, 0.5, 0.2)),
-        ("0, 0.3, 1", DVec3::new(0.0, 0.3, 1.0)),
-        ("0.5, 0.5, 0.5", DVec3::splat(0.5)),
+    for (text, color, kinds) in [
+        ("0.9, 0.5, 0.2", DVec3::new(0.9, 0.5, 0.2), &["constant", "texture"][..]),
+        ("0, 0.3, 1", DVec3::new(0.0, 0.3, 1.0), &["constant"]),
+        ("0.5, 0.5, 0.5", DVec3::splat(0.5), &["constant"]),
     ] {
-        for (kind, transmittance) in [("constant", constant(text)), ("texture", texture(text))] {
+        for &kind in kinds {
+            let transmittance = if kind == "texture" { texture(text) } else { constant(text) };
             let packed = pack(&through_a_pane(&transmittance, &plain), 3);
             assert_eq!(packed.features.tints, kind == "texture" || text != "0.5, 0.5, 0.5");
             let expected = color * behind;
@@ -225,4 +241,27 @@ fn panes_take_their_colour_from_what_is_behind() {
             }
         }
     }
+}
+
+#[test]
+fn numbers_of_a_mesh_stand_beside_images() {
+    let scene = from_file("attributes.xml", &[]);
+    let packed = pack(&scene, 5);
+    assert!(packed.features.attributes && packed.features.textures);
+    let device = on_device(&packed, 8192);
+    let far = excess(&device, &ATTRIBUTES, 0.01);
+    assert!(far < 2e-3, "{far}");
+    assert!(excess(&device, &brighter(&ATTRIBUTES, 1.03), 0.01) > 2e-3);
+    // The planted faults: the numbers of other triangles, and an image by other coordinates.
+    let mut turned = packed.clone();
+    turned.corners.iter_mut().for_each(|corners| corners.number = (corners.number + 1) % 3);
+    let mut moved = packed.clone();
+    moved.corners.iter_mut().for_each(|corners| corners.v += 0.3);
+    for wrong in [turned, moved] {
+        let far = excess(&by_reference(&wrong, 1024), &ATTRIBUTES, 0.01);
+        assert!(far > 3e-2, "{far}");
+    }
+    let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
+    let apart = device.iter().zip(&reference).filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count();
+    assert!(apart <= 2, "{apart} pixels differ");
 }

@@ -339,7 +339,7 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         }
     }
     if (HAS_TEXTURES && (surface.textures_1 | (surface.textures_2 & 0xffffu)) != 0u) {
-        apply_textures(surface, texture_coordinates(primitive, hit.primitive, point, hit.barycentric));
+        apply_textures(surface, hit.primitive, texture_coordinates(primitive, hit.primitive, point, hit.barycentric), hit.barycentric);
     }
     path.offset = offset_distance(largest);
     path.normal = normal;

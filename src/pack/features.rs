@@ -75,6 +75,8 @@ pub struct Features {
     pub panes: bool,
     /// Thin panes of a colour; they count among chromatic media.
     pub tints: bool,
+    /// Colours that depend on the triangle and the place on it.
+    pub attributes: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
     /// Surfaces with more than one BSDF.
@@ -174,6 +176,10 @@ impl Features {
             }),
             panes: flag(SURFACE_PANE),
             tints,
+            attributes: packed
+                .textures
+                .iter()
+                .any(|texture| texture.flags & TEXTURE_ATTRIBUTE != 0 && texture.kind == TEXTURE_BITMAP),
             slides: packed.lights.iter().any(|light| light.texture != 0),
             far_clip: {
                 let eye = packed.params.camera_origin;
@@ -236,6 +242,7 @@ impl Features {
             masks: true,
             panes: true,
             tints: true,
+            attributes: true,
             slides: true,
             far_clip: true,
             tree: true,
@@ -287,6 +294,7 @@ impl Features {
             ("HAS_MASK", self.masks),
             ("HAS_PANES", self.panes),
             ("HAS_TINTS", self.tints),
+            ("HAS_ATTRIBUTES", self.attributes),
             ("HAS_SLIDES", self.slides),
             ("HAS_FAR_CLIP", self.far_clip),
             ("HAS_BLENDS", self.blends),

@@ -507,6 +507,8 @@ pub const TEXTURE_NEAREST: u32 = 1;
 pub const TEXTURE_MIRROR: u32 = 2;
 /// Bit 2: outside of the unit square the pixels at the edge go on. With neither bit, the image is repeated.
 pub const TEXTURE_CLAMP: u32 = 4;
+/// Bit 3: numbers of the triangles of a mesh, a block of 2 × 2 pixels for each.
+pub const TEXTURE_ATTRIBUTE: u32 = 8;
 /// [`Light::kind`]: a triangle.
 pub const LIGHT_TRIANGLE: u32 = 0;
 /// [`Light::kind`]: a parallelogram.
@@ -605,6 +607,7 @@ pub fn glsl() -> String {
         ("TEXTURE_NEAREST", TEXTURE_NEAREST),
         ("TEXTURE_MIRROR", TEXTURE_MIRROR),
         ("TEXTURE_CLAMP", TEXTURE_CLAMP),
+        ("TEXTURE_ATTRIBUTE", TEXTURE_ATTRIBUTE),
         ("LIGHT_TRIANGLE", LIGHT_TRIANGLE),
         ("LIGHT_QUAD", LIGHT_QUAD),
         ("LIGHT_SPHERE", LIGHT_SPHERE),

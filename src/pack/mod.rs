@@ -330,6 +330,7 @@ const EMPTY_FEATURES: Features = Features {
     masks: false,
     panes: false,
     tints: false,
+    attributes: false,
     slides: false,
     far_clip: false,
     blends: false,
@@ -406,7 +407,8 @@ fn pack_surfaces(
     let mut chain = material::pack_bsdf(&shape.bsdf, textures, values);
     let smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
     let smooth = if smooth && !material::is_null(&shape.bsdf) { SURFACE_SMOOTH } else { 0 };
-    let uvs = if shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };
+    let looked_up = shape.bsdf.textures().iter().any(|texture| texture.constant().is_none());
+    let uvs = if looked_up || shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };
     for surface in &mut chain {
         surface.flags |= smooth | uvs;
         surface.sigma_t_step = media[inside as usize].sigma_t - media[outside as usize].sigma_t;

@@ -21,8 +21,7 @@ use super::path_state::{
     INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_lens, sample_set, survived_throughput,
 };
 use super::path_surface::{
-    Place, apply_textures, opacity_at, pane_depth, shading_normal, share_at, surface_tangent, texture_coordinates,
-    turn_frame,
+    Place, apply_textures, opacity_at, pane_depth, shading_normal, share_at, surface_tangent, turn_frame,
 };
 use super::path_vertex::{Vertex, medium_towards, offset_origin, sides_agree, surface_point, to_surface_frame};
 use super::ray::offset_distance;
@@ -337,7 +336,7 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     }
     let mut surface = *surface;
     if surface.textures_1 | surface.textures_2 & 0xffff != 0 {
-        apply_textures(tables, &mut surface, texture_coordinates(tables, &place));
+        apply_textures(tables, &mut surface, &place);
     }
     path.offset = offset_distance(largest);
     path.normal = normal;

@@ -87,7 +87,7 @@ fn first_hit(packed: &Packed, tables: &Tables, mut path: Path, aovs: &[Aov]) -> 
             AovKind::Albedo => {
                 let mut surface = *surface;
                 if surface.textures_1 != 0 {
-                    apply_textures(tables, &mut surface, texture_coordinates(tables, &place));
+                    apply_textures(tables, &mut surface, &place);
                 }
                 let kind = surface.flags >> SURFACE_KIND_SHIFT;
                 let boundary = primitive.surface & crate::pack::layout::PRIMITIVE_BOUNDARY != 0;

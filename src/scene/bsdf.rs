@@ -319,7 +319,7 @@ impl Bsdf {
             Bsdf::Relief { .. } => return Some("a map of normals or heights"),
             _ => false,
         };
-        if self.textures().iter().any(|texture| texture.constant().is_none()) {
+        if self.textures().iter().any(|texture| texture.needs_uvs()) {
             Some("a texture")
         } else {
             anisotropic.then_some("anisotropic roughness")

@@ -211,6 +211,10 @@ fn relief<'a>(
     props: &Props<'a>,
     map: ReliefMap,
 ) -> Result<Bsdf, SceneError> {
+    if let ReliefMap::Normals(Texture::Attribute { .. }) | ReliefMap::Heights(Texture::Attribute { .. }, _) = map {
+        let what = child.object.describe();
+        return Err(child.object.at.error(format!("the map of {what} cannot be a \"mesh_attribute\"; use \"bitmap\"")));
+    }
     let flips = props.boolean("flip_invalid_normals")?.is_none_or(|given| given.value);
     let fades = props.boolean("use_shadowing_function")?.is_none_or(|given| given.value);
     let inner = only_child(child, props)?;
