@@ -5,7 +5,7 @@ mod common;
 
 use common::images::{Image, average, by_reference, on_device};
 use common::scenes::{from_file, pack};
-use glam::DVec3;
+use glam::{DVec3, Vec3Swizzles};
 use std::path::Path;
 use tyndall::pack::layout::Surface;
 use tyndall::scene::{Scene, mitsuba};
@@ -104,10 +104,10 @@ fn light_passes_panes_without_an_event() {
         // The planted faults: another brightness, and a path of one event less.
         assert!(excess(&device, &brighter(expected, 1.08), 0.02) > 6e-3);
         if packed.features.tints {
-            // Another colour of the same brightness in one channel.
+            // The colour of another channel.
             let mut wrong = packed.clone();
-            wrong.surfaces.iter_mut().for_each(|surface| surface.transmittance.y *= 0.9);
-            assert!(excess(&on_device(&wrong, 4096), expected, 0.02) > 6e-3, "{parameters:?}");
+            wrong.surfaces.iter_mut().for_each(|surface| surface.transmittance = surface.transmittance.yzx());
+            assert!(excess(&by_reference(&wrong, 4096), expected, 0.02) > 3e-2, "{parameters:?}");
         }
         let mut short = from_file("panes.xml", parameters);
         short.integrator.max_depth = short.integrator.max_depth.map(|depth| depth - 1);
@@ -182,7 +182,7 @@ fn principled_surfaces_look_as_in_mitsuba() {
         for change in [rough as fn(&mut Surface), |surface| surface.internal_reflectance = 0.0] {
             let mut wrong = packed.clone();
             wrong.surfaces.iter_mut().for_each(change);
-            let far = excess(&on_device(&wrong, 4096), expected, 0.005);
+            let far = excess(&by_reference(&wrong, 4096), expected, 0.005);
             assert!(far > 3e-3, "{material}: {far}");
         }
         let (device, reference) = (on_device(&packed, 64), by_reference(&packed, 64));
@@ -250,8 +250,9 @@ fn numbers_of_a_mesh_stand_beside_images() {
     assert!(packed.features.attributes && packed.features.textures);
     let device = on_device(&packed, 8192);
     let far = excess(&device, &ATTRIBUTES, 0.01);
-    assert!(far < 2e-3, "{far}");
-    assert!(excess(&device, &brighter(&ATTRIBUTES, 1.03), 0.01) > 2e-3);
+    // Standard errors of Mitsuba's pixels are up to 0.001.
+    assert!(far < 5e-3, "{far}");
+    assert!(excess(&device, &brighter(&ATTRIBUTES, 1.03), 0.01) > 5e-3);
     // The planted faults: the numbers of other triangles, and an image by other coordinates.
     let mut turned = packed.clone();
     turned.corners.iter_mut().for_each(|corners| corners.number = (corners.number + 1) % 3);
