@@ -216,7 +216,7 @@ fn through_a_pane(color: &str, medium: &str) -> Scene {
         <shape type="cube"><bsdf type="null"/>{medium}</shape>
         <emitter type="constant"><rgb name="radiance" value="1"/></emitter></scene>"#
     );
-    mitsuba::parse_str(&text, Path::new("scene.xml"), &[]).unwrap().scene
+    mitsuba::parse_str(&text, Path::new("scene.xml"), &[]).expect("the scene is valid").scene
 }
 
 #[test]
@@ -232,6 +232,7 @@ fn panes_take_their_colour_from_what_is_behind() {
             r#"<texture type="checkerboard" name="specular_transmittance"><rgb name="color0" value="{color}"/><rgb name="color1" value="{color}"/></texture>"#
         )
     };
+    // What passes a pane must not hang on the number that chooses where on the way the medium glows.
     // Radiance through 2 units of length: what comes from behind, and what is added on the way.
     let left = (-2.0 * sigma_t).exp();
     let behind = left + emission / sigma_t * (DVec3::ONE - left);

@@ -183,7 +183,7 @@ void cross_surface(inout Path path, Surface surface, Hit hit) {
 // Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
 bool passes_mask(inout Path path, Surface surface, Primitive primitive, Hit hit) {
     float opacity = opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric, path.direction);
-    float u = sample_set(path, MASK_SETS + path.crossings).z; // the first two belong to what media emit
+    float u = sample_set(path, MASK_SETS + path.crossings).z; // the sets are those of emission as well, which takes the first
     path.crossings += 1u;
     path.passed *= 1.0 - opacity;
     return u >= opacity;

@@ -197,7 +197,7 @@ fn cross_surface(tables: &Tables, path: &mut Path, surface: &Surface, hit: &Hit)
 /// Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
 fn passes_mask(tables: &Tables, path: &mut Path, surface: &Surface, place: &Place) -> bool {
     let opacity = opacity_at(tables, surface, place, path.direction);
-    let u = sample_set(tables, path, MASK_SETS + path.crossings).z; // the first two belong to what media emit
+    let u = sample_set(tables, path, MASK_SETS + path.crossings).z; // the sets are those of emission as well, which takes the first
     path.crossings += 1;
     path.passed *= 1.0 - opacity;
     u >= opacity
