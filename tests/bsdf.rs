@@ -6,7 +6,7 @@ use common::images;
 use common::random::Random;
 use common::scenes::{self, v};
 use common::statistics::{chi_squared_tail, mean_and_error};
-use common::surfaces::{Answer, Query, ask, brushed, glass, metal, plastic, rough_plastic, single, values};
+use common::surfaces::{Answer, Query, ask, brushed, glass, metal, plastic, principled, rough_plastic, single, values};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use tyndall::pack::Packed;
@@ -120,6 +120,18 @@ fn rough_surfaces() -> Vec<(String, Surface, f64)> {
             }
         }
     }
+    for (roughness, metallic, spec_trans) in [(0.4, 0.0, 0.0), (0.7, 0.3, 0.0), (0.5, 0.1, 0.6), (0.6, 0.0, 1.0)] {
+        for cosine in [0.8, 0.3, -0.7] {
+            let surface = principled(roughness, metallic, spec_trans);
+            let name = |kind: &str| format!("{kind}, {roughness}, {metallic}, {spec_trans}, cosine {cosine}");
+            if cosine > 0.0 || spec_trans > 0.0 {
+                all.push((name("principled"), surface, cosine));
+            }
+            if cosine == 0.3 {
+                all.push((name("brushed principled"), Surface { alpha: 1.5, ..brushed(surface, 0.6) }, cosine));
+            }
+        }
+    }
     all
 }
 
@@ -152,7 +164,11 @@ fn rough_surfaces_draw_what_their_densities_say() {
         }
         let (albedo, error) = mean_and_error(&energy);
         // What facets shadow is lost, and under a rough varnish twice.
-        let least = if name.starts_with("rough plastic") { 0.35 } else { 0.5 };
+        let least = match &name {
+            name if name.contains("principled") => 0.2,
+            name if name.starts_with("rough plastic") => 0.35,
+            _ => 0.5,
+        };
         assert!(albedo > least && albedo <= 1.0 + 4.0 * error, "{name}: it reflects and transmits {albedo} ± {error}");
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -302,6 +318,8 @@ fn device_and_reference_follow_the_same_paths() {
         ("rough metal", false, metal(0.15, false)),
         ("smooth plastic", false, plastic(0.0, false)),
         ("rough plastic", false, rough_plastic(0.2, true)),
+        ("principled", false, principled(0.4, 0.3, 0.0)),
+        ("clear principled with a medium", true, principled(0.5, 0.1, 0.7)),
     ];
     for (name, medium, surface) in cases {
         let packed = pack_with(&box_with(medium), 17, &[("ball", surface)]);

@@ -77,6 +77,18 @@ fn the_output_is_checked_before_anything_else() {
         "there is no directory",
     );
     fails([OsStr::new("render"), scene.as_ref(), OsStr::new("-o"), directory.path().as_ref()], 74, "cannot write");
+    for name in ["cloud.png", "cloud", "cloud.exr.png", ".exr"] {
+        let image = directory.path().join(name);
+        let arguments = [OsStr::new("render"), scene.as_ref(), OsStr::new("-o"), image.as_ref()];
+        fails(
+            arguments,
+            2,
+            &format!("{name} does not end in .exr: images are OpenEXR files; --preview OUT.png writes a PNG"),
+        );
+    }
+    // In capitals it is the same, so that the scene is what is wrong here.
+    let image = directory.path().join("cloud.EXR");
+    fails([OsStr::new("render"), scene.as_ref(), OsStr::new("-o"), image.as_ref()], 2, "a.xml");
     assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0, "nothing was written");
 }
 

@@ -271,3 +271,64 @@ fn the_second_signal_ends_at_once() {
     }
     panic!("the second signal never had its default effect");
 }
+
+/// A scene of the repository with `moment` around its integrator, in a directory of its own.
+fn with_moments(directory: &Path, file: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let scene = std::fs::read_to_string(root.join(file)).unwrap();
+    let (before, rest) = scene.split_once("<integrator").unwrap();
+    let (inner, after) = rest.split_once("</integrator>").unwrap();
+    let folder = root.join(file).parent().unwrap().to_str().unwrap().to_owned();
+    let path = directory.join("moments.xml");
+    let wrapped = format!("<integrator type=\"moment\"><integrator name=\"inner\"{inner}</integrator></integrator>");
+    std::fs::write(&path, format!("{before}{wrapped}<path value=\"{folder}\"/>{after}")).unwrap();
+    path
+}
+
+#[track_caller]
+fn render_file(scene: &Path, output: &Path, arguments: &[&str]) -> (Image, String) {
+    let result = program().arg("render").arg(scene).arg("-o").arg(output).args(arguments).output().unwrap();
+    assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
+    (exr::read(output).unwrap(), text(&result.stderr))
+}
+
+#[test]
+fn second_moments_are_those_of_samples() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = with_moments(directory.path(), "tests/data/mitsuba/edge.xml");
+    let output = directory.path().join("a.exr");
+    // A lamp of (1, 2, 3) is seen or not: x² is the lamp times x, and so is its mean.
+    for filter in ["box", "gaussian", "tent"] {
+        let define = format!("filter={filter}");
+        let (image, _) = render_file(&scene, &output, &["--spp", "200", "-D", &define]);
+        let mut between = 0;
+        for (color, lamp) in [("R", 1.0), ("G", 2.0), ("B", 3.0)] {
+            let means = image.channel(color).unwrap();
+            let moments = image.channel(&format!("m2_inner.{color}")).unwrap();
+            for (mean, moment) in means.iter().zip(moments) {
+                assert!((moment - lamp * mean).abs() < 1e-4 * lamp * lamp, "{filter}: {moment} for {mean}");
+                // The planted fault: the square of the mean.
+                between += usize::from((mean * mean - moment).abs() > 1e-2);
+            }
+        }
+        assert!(between > 10, "{filter}: {between} values tell moments from squares");
+    }
+    // Samples that count negatively have no moments, which is said.
+    let (image, messages) = render_file(&scene, &output, &["--spp", "16", "-D", "filter=mitchell"]);
+    assert!(image.channels.iter().all(|channel| !channel.name.starts_with("m2_")));
+    assert!(messages.contains("moments.xml:6:") && messages.contains("no second moments are written"), "{messages}");
+}
+
+#[test]
+fn pixels_with_second_moments_share_no_paths() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = with_moments(directory.path(), "scenes/high-scattering.xml");
+    let output = directory.path().join("a.exr");
+    let small = ["--resolution", "64x64", "--spp", "2"];
+    let (image, _) = render_file(&scene, &output, &small);
+    let original = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/high-scattering.xml");
+    let (alone, _) = render_file(&original, &output, &[&small[..], &["--no-sharing"]].concat());
+    assert_eq!(pixel_bits(&image), pixel_bits(&alone));
+    let (shared, _) = render_file(&original, &output, &small);
+    assert_ne!(pixel_bits(&image), pixel_bits(&shared), "the scene is one that would share them");
+}

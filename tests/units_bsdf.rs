@@ -5,16 +5,16 @@ mod common;
 use common::comparison::Comparison;
 use common::random::Random;
 use common::scenes::v;
-use common::surfaces::{Query, ask, brushed, glass, metal, plastic, rough_plastic, single, values};
+use common::surfaces::{Query, ask, brushed, glass, metal, plastic, principled, rough_plastic, single, values};
 use common::tolerances::comparison;
 use common::units::widen;
 use glam::{DVec2, DVec3};
 use tyndall::pack::layout::{SURFACE_GGX, SURFACE_NONLINEAR, SURFACE_THIN, Surface};
 use tyndall::reference::bindings;
 use tyndall::reference::bsdf::{
-    BsdfValue, eval_bsdf, facet_density, facet_masking, facet_pdf, fresnel_conductor, fresnel_dielectric, roughness,
-    sample_bsdf, sample_facet,
+    BsdfValue, facet_density, facet_masking, facet_pdf, fresnel_conductor, fresnel_dielectric, roughness, sample_facet,
 };
+use tyndall::reference::path_vertex::{eval_surface, sample_surface};
 
 /// The largest of the program's random numbers.
 const LAST: f64 = 1.0 - 1.0 / 16_777_216.0;
@@ -36,6 +36,27 @@ fn surfaces() -> Vec<Surface> {
             all.extend([brushed(glass(alpha, ggx), alpha_v), brushed(metal(alpha, ggx), alpha_v)]);
         }
     }
+    all
+}
+
+/// Every parameter of the principled BSDF at its ends and between them.
+fn principled_surfaces() -> Vec<Surface> {
+    let mut all = Vec::new();
+    for roughness in [0.0, 0.1, 0.3, 0.7, 1.0] {
+        for (metallic, spec_trans) in [(0.0, 0.0), (1.0, 0.0), (0.2, 0.7), (0.0, 1.0)] {
+            all.push(principled(roughness, metallic, spec_trans));
+        }
+    }
+    let plain = principled(0.5, 0.3, 0.4);
+    let opaque = principled(0.5, 0.3, 0.0);
+    all.push(Surface { alpha: 2.0, ..brushed(plain, 0.5) });
+    all.push(Surface { eta: 0.7, ..plain });
+    all.push(Surface { eta: 1.05, ..plain });
+    all.push(Surface { eta: 1.0, ..opaque });
+    all.push(Surface { specular_weight: 0.001, internal_reflectance: 1.0, ..opaque });
+    all.push(Surface { specular_weight: 0.1, internal_reflectance: 1.0, ..opaque });
+    all.push(Surface { reflectance: glam::Vec3::ZERO, ..plain });
+    all.push(Surface { internal_reflectance: 0.0, extinction: glam::Vec3::ZERO, ..opaque });
     all
 }
 
@@ -211,7 +232,7 @@ fn facets_and_fresnel() {
 
 #[test]
 fn surfaces_scatter_as_the_reference() {
-    let (surfaces, table) = (surfaces(), values());
+    let (surfaces, table) = ([surfaces(), principled_surfaces()].concat(), values());
     let queries = queries(&surfaces);
     let names = ["eval_bsdf value", "eval_bsdf pdf", "sample_bsdf direction", "sample_bsdf pdf", "sample_bsdf weight"];
     let mut functions = Functions::new(&names);
@@ -224,27 +245,27 @@ fn surfaces_scatter_as_the_reference() {
         // Both directions moved by the rounding of single precision.
         let around = |wo: DVec3| {
             let pairs = nudged(wi).map(|wi| (wi, wo)).chain(nudged(wo).map(|wo| (wi, wo)));
-            let value = eval_bsdf(&surface, &table, wi, wo);
+            let value = eval_surface(&surface, &table, wi, wo);
             let factor = 1.0 + refracted(&surface, wi, wo);
             let dimmed = BsdfValue { value: value.value * factor, pdf: value.pdf * factor };
             // Value and density may lose of it separately.
             let apart = BsdfValue { value: value.value * factor, pdf: value.pdf / factor };
-            pairs.map(|(wi, wo)| eval_bsdf(&surface, &table, wi, wo)).chain([dimmed, apart]).collect::<Vec<_>>()
+            pairs.map(|(wi, wo)| eval_surface(&surface, &table, wi, wo)).chain([dimmed, apart]).collect::<Vec<_>>()
         };
-        let (asked, moved) = (eval_bsdf(&surface, &table, wi, wo), around(wo));
+        let (asked, moved) = (eval_surface(&surface, &table, wi, wo), around(wo));
         let values: Vec<DVec3> = moved.iter().map(|moved| moved.value).collect();
         let pdfs: Vec<f64> = moved.iter().map(|moved| moved.pdf).collect();
         functions.near_vector("eval_bsdf value", &case, answer.value, asked.value, &values);
         functions.near("eval_bsdf pdf", &case, answer.value_pdf, asked.pdf, &pdfs);
 
-        let found = sample_bsdf(&surface, &table, wi, u, lobe);
+        let found = sample_surface(&surface, &table, wi, u, lobe);
         let turned = [-2.4e-7, 2.4e-7].map(|step| DVec2::new(u.x, u.y + step));
         let moved: Vec<_> = nudged(wi)
-            .map(|wi| sample_bsdf(&surface, &table, wi, u, lobe))
-            .chain(turned.map(|u| sample_bsdf(&surface, &table, wi, u, lobe)))
+            .map(|wi| sample_surface(&surface, &table, wi, u, lobe))
+            .chain(turned.map(|u| sample_surface(&surface, &table, wi, u, lobe)))
             .chain([-1.2e-7, 1.2e-7].map(|step| {
                 let u = DVec2::new((u.x * (1.0 + step)).min(LAST), u.y);
-                sample_bsdf(&surface, &table, wi, u, lobe)
+                sample_surface(&surface, &table, wi, u, lobe)
             }))
             .chain([-4e-6, 4e-6].map(|step| {
                 // The tangent of the facet, whose error sample_facet declares.
@@ -253,9 +274,9 @@ fn surfaces_scatter_as_the_reference() {
                     alpha_v: surface.alpha_v * (1.0 + step),
                     ..surface
                 };
-                sample_bsdf(&other, &table, wi, u, lobe)
+                sample_surface(&other, &table, wi, u, lobe)
             }))
-            .chain([-1e-6, 1e-6].map(|step| sample_bsdf(&surface, &table, wi, u, lobe + step)))
+            .chain([-1e-6, 1e-6].map(|step| sample_surface(&surface, &table, wi, u, lobe + step)))
             .collect();
         // At the border of two lobes, or of failure, either is right.
         let vanishes = found.pdf > 0.0 && around(found.direction).iter().any(|moved| moved.pdf <= 0.0);
@@ -272,7 +293,7 @@ fn surfaces_scatter_as_the_reference() {
         assert_eq!(answer.pdf > 0.0, found.pdf > 0.0, "{case}: {answer:?}, expected {found:?}");
         if found.pdf > 0.0 {
             // Of the direction that the kernel found.
-            let (expected, moved) = (eval_bsdf(&surface, &table, wi, answer.wo()), around(answer.wo()));
+            let (expected, moved) = (eval_surface(&surface, &table, wi, answer.wo()), around(answer.wo()));
             let weights: Vec<DVec3> =
                 moved.iter().filter(|moved| moved.pdf > 0.0).map(|moved| moved.value / moved.pdf).collect();
             let pdfs: Vec<f64> = moved.iter().map(|moved| moved.pdf).collect();

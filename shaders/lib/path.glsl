@@ -187,10 +187,27 @@ void cross_surface(inout Path path, Surface surface, Hit hit) {
 // Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
 bool passes_mask(inout Path path, Surface surface, Primitive primitive, Hit hit) {
     float opacity = opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric, path.direction);
-    float u = sample_set(path, MASK_SETS + path.crossings).x;
+    float u = sample_set(path, MASK_SETS + path.crossings).z; // the sets are those of emission as well, which takes the first
     path.crossings += 1u;
     path.passed *= 1.0 - opacity;
     return u >= opacity;
+}
+
+// Goes on behind a coloured pane. Its colour is an optical depth of the flight, so that whatever weighs a flight knows of it; but no flight
+// ends there. Instead the channel is chosen anew by what is left of each, and the throughput loses what all of them lose together.
+void cross_pane(inout Path path, vec3 depth) {
+    if (max_component(depth) == 0.0) {
+        return;
+    }
+    vec3 weights = channel_weights(path.throughput);
+    float before = dot(weights, exp_minus(path.tau_rgb));
+    path.tau_rgb += depth;
+    path.tau_mean += depth;
+    vec3 left = weights * exp_minus(path.tau_rgb);
+    float sum = sum_components(left);
+    path.throughput *= sum / before;
+    path.alive = sum > 0.0;
+    path.channel = sample_channel(left / sum, sample_set(path, MASK_SETS + path.crossings).w);
 }
 
 // Puts the one of the BSDFs of a surface in its place that acts at this vertex: by the side, or by chance. A choice has the share of the
@@ -289,6 +306,9 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         crosses = HAS_MASK && (surface.flags & SURFACE_MASK) != 0u && passes_mask(path, surface, primitive, hit);
     }
     if ((HAS_BOUNDARIES || HAS_MASK) && crosses) {
+        if (HAS_TINTS && (surface.flags & SURFACE_PANE) != 0u) {
+            cross_pane(path, pane_depth(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric));
+        }
         path.anchor = point;
         cross_surface(path, surface, hit);
         return false;
@@ -323,7 +343,7 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         }
     }
     if (HAS_TEXTURES && (surface.textures_1 | (surface.textures_2 & 0xffffu)) != 0u) {
-        apply_textures(surface, texture_coordinates(primitive, hit.primitive, point, hit.barycentric));
+        apply_textures(surface, hit.primitive, texture_coordinates(primitive, hit.primitive, point, hit.barycentric), hit.barycentric);
     }
     path.offset = offset_distance(largest);
     path.normal = normal;
@@ -350,7 +370,13 @@ bool advance_shadow(inout Path path, inout Hit hit) {
     Primitive primitive = PRIMITIVE(hit.primitive);
     Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
     if (HAS_MASK && (primitive.surface & PRIMITIVE_BOUNDARY) == 0u) {
-        path.passed *= 1.0 - opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric, path.direction);
+        vec3 point = path.origin + path.direction * hit.t;
+        path.passed *= 1.0 - opacity_at(surface, primitive, hit.primitive, point, hit.barycentric, path.direction);
+        if (HAS_TINTS && (surface.flags & SURFACE_PANE) != 0u) {
+            vec3 depth = pane_depth(surface, primitive, hit.primitive, point, hit.barycentric);
+            path.tau_rgb += depth;
+            path.tau_mean += depth;
+        }
     }
     float t_max = path.t_max;
     cross_surface(path, surface, hit);

@@ -61,6 +61,9 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
             if ((surface.flags & SURFACE_MASK) != 0u) {
                 float opacity = opacity_at(surface, primitive, index, path.origin + path.direction * t, barycentric, path.direction);
                 hit.passed *= 1.0 - opacity;
+                if (HAS_TINTS && (surface.flags & SURFACE_PANE) != 0u) {
+                    hit.tau_rgb += pane_depth(surface, primitive, index, path.origin + path.direction * t, barycentric);
+                }
                 opaque = opacity >= 1.0;
                 boundary = true;
             }

@@ -1,5 +1,6 @@
 // What a surface is at a point: texture coordinates, colours, opacity, and the frame of its BSDF.
 #include "lib/path_state.glsl"
+#include "lib/math.glsl"
 #include "lib/texture.glsl"
 #include "lib/bsdf.glsl"
 
@@ -38,6 +39,36 @@ vec3 shading_normal(uint index, vec2 barycentric, vec3 normal) {
     return squared > 0.0 ? sum * inversesqrt(squared) : normal;
 }
 
+// Optical depth at which a share is left. What is not there at all is out of reach for any flight.
+float color_depth(float share) {
+    return share > 1e-30 ? minus_log(min(share, 1.0)) : 1000.0;
+}
+
+// A colour at a place on a primitive.
+vec3 texture_at(uint texture_index, uint index, vec2 uv, vec2 barycentric) {
+    Texture texture = TEXTURE(texture_index);
+    if (HAS_ATTRIBUTES && (texture.flags & TEXTURE_ATTRIBUTE) != 0u) {
+        return eval_attribute(texture, CORNERS(index).number, barycentric);
+    }
+    return eval_texture(texture, uv);
+}
+
+// What a thin pane leaves of the light that it does not reflect.
+vec3 pane_transmittance(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric) {
+    uint texture = surface.textures_2 & 0xffffu;
+    if (HAS_TEXTURES && texture != 0u) {
+        return texture_at(texture - 1u, index, texture_coordinates(primitive, index, point, barycentric), barycentric);
+    }
+    return surface.transmittance;
+}
+
+// The colour of a thin pane as an optical depth of each channel, 0 for the one that it leaves the most of: of the rest `opacity_at` knows.
+vec3 pane_depth(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric) {
+    vec3 color = pane_transmittance(surface, primitive, index, point, barycentric);
+    vec3 share = color / max(max_component(color), 1e-30);
+    return vec3(color_depth(share.x), color_depth(share.y), color_depth(share.z));
+}
+
 // Probability that light in a direction meets a surface that it may also pass: a mask, or a thin pane, of which `opacity` says how
 // much of the light is left that it does not reflect.
 float opacity_at(Surface surface, Primitive primitive, uint index, vec3 point, vec2 barycentric, vec3 direction) {
@@ -46,27 +77,34 @@ float opacity_at(Surface surface, Primitive primitive, uint index, vec3 point, v
         if (HAS_SHADING_NORMALS && (surface.flags & SURFACE_SMOOTH) != 0u) {
             normal = shading_normal(index, barycentric, normal);
         }
-        return 1.0 - (1.0 - pane_reflectance(dot(normal, direction), surface.eta)) * surface.opacity;
+        float most = surface.opacity;
+        if (HAS_TINTS && (surface.textures_2 & 0xffffu) != 0u) {
+            most = max_component(pane_transmittance(surface, primitive, index, point, barycentric));
+        }
+        return 1.0 - (1.0 - pane_reflectance(dot(normal, direction), surface.eta)) * most;
     }
     uint texture = surface.textures_2 >> 16;
     if (HAS_TEXTURES && texture != 0u) {
         vec2 uv = texture_coordinates(primitive, index, point, barycentric);
-        return clamp(eval_texture(TEXTURE(texture - 1u), uv).x, 0.0, 1.0);
+        return clamp(texture_at(texture - 1u, index, uv, barycentric).x, 0.0, 1.0);
     }
     return surface.opacity;
 }
 
 // Puts the colours at a place in the place of their means.
-void apply_textures(inout Surface surface, vec2 uv) {
+void apply_textures(inout Surface surface, uint index, vec2 uv, vec2 barycentric) {
     uint reflectance = surface.textures_1 & 0xffffu, specular = surface.textures_1 >> 16, transmittance = surface.textures_2 & 0xffffu;
     if (reflectance != 0u) {
-        surface.reflectance = eval_texture(TEXTURE(reflectance - 1u), uv);
+        surface.reflectance = texture_at(reflectance - 1u, index, uv, barycentric);
     }
     if (specular != 0u) {
-        surface.specular = eval_texture(TEXTURE(specular - 1u), uv);
+        surface.specular = texture_at(specular - 1u, index, uv, barycentric);
     }
     if (transmittance != 0u) {
-        surface.transmittance = eval_texture(TEXTURE(transmittance - 1u), uv);
+        surface.transmittance = texture_at(transmittance - 1u, index, uv, barycentric);
+        if (HAS_TINTS && (surface.flags & SURFACE_PANE) != 0u) {
+            surface.opacity = max_component(surface.transmittance);
+        }
     }
 }
 
@@ -94,7 +132,8 @@ float share_at(Surface surface, Primitive primitive, uint index, vec3 point, vec
     if (!HAS_TEXTURES || surface.share_texture == 0u) {
         return surface.share;
     }
-    float share = clamp(eval_texture(TEXTURE(surface.share_texture - 1u), texture_coordinates(primitive, index, point, barycentric)).x, 0.0, 1.0);
+    vec2 uv = texture_coordinates(primitive, index, point, barycentric);
+    float share = clamp(texture_at(surface.share_texture - 1u, index, uv, barycentric).x, 0.0, 1.0);
     return (surface.flags & SURFACE_INVERTED) != 0u ? 1.0 - share : share;
 }
 

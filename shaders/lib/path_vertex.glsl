@@ -5,6 +5,7 @@
 #include "lib/ray.glsl"
 #include "lib/phase.glsl"
 #include "lib/bsdf.glsl"
+#include "lib/principled.glsl"
 
 // A point where light is scattered, in a medium or on a surface.
 struct Vertex {
@@ -43,6 +44,21 @@ bool sides_agree(Vertex vertex, float local_z, vec3 direction) {
     return !(HAS_SHADING_NORMALS || HAS_RELIEFS) || (local_z > 0.0) == (dot(vertex.normal, direction) > 0.0);
 }
 
+// What a surface does to light, whatever its kind.
+BsdfValue eval_surface(Surface surface, vec3 wi, vec3 wo) {
+    if (HAS_PRINCIPLED && bsdf_kind(surface) == BSDF_PRINCIPLED) {
+        return eval_principled(surface, wi, wo);
+    }
+    return eval_bsdf(surface, wi, wo);
+}
+
+BsdfSample sample_surface(Surface surface, vec3 wi, vec2 u, float lobe) {
+    if (HAS_PRINCIPLED && bsdf_kind(surface) == BSDF_PRINCIPLED) {
+        return sample_principled(surface, wi, u, lobe);
+    }
+    return sample_bsdf(surface, wi, u, lobe);
+}
+
 // Scattering function times cosine, and the density with which directions are sampled.
 BsdfValue eval_scattering(Vertex vertex, vec3 direction) {
     if (HAS_MEDIA && vertex.in_medium) {
@@ -57,7 +73,7 @@ BsdfValue eval_scattering(Vertex vertex, vec3 direction) {
     if (!sides_agree(vertex, local.z, direction)) {
         return BsdfValue(vec3(0.0), 0.0);
     }
-    BsdfValue found = eval_bsdf(vertex.surface, vertex.incident, local);
+    BsdfValue found = eval_surface(vertex.surface, vertex.incident, local);
     if (HAS_RELIEFS && vertex.fade > 0.0) {
         found.value *= relief_fading(vertex.fade, dot(vertex.base, direction));
     }
@@ -78,7 +94,7 @@ BsdfSample sample_scattering(Vertex vertex, vec2 u, float lobe) {
         }
         return BsdfSample(direction, vertex.albedo, eval_scattering(vertex, direction).pdf, 1.0);
     }
-    BsdfSample found = sample_bsdf(vertex.surface, vertex.incident, u, lobe);
+    BsdfSample found = sample_surface(vertex.surface, vertex.incident, u, lobe);
     float side = found.direction.z;
     found.direction = from_surface_frame(vertex.tangent, vertex.axis, found.direction);
     if (!sides_agree(vertex, side, found.direction)) {

@@ -47,6 +47,14 @@ vec3 eval_texture(Texture texture, vec2 uv) {
     return mix(upper, lower, share.y);
 }
 
+// The numbers that a mesh has at a place on one of its triangles, which have blocks of 2 x 2 pixels in rows: those of the corners first.
+vec3 eval_attribute(Texture texture, uint triangle, vec2 barycentric) {
+    uint columns = texture.width / 2u, row = triangle / columns;
+    int x = int(2u * (triangle - row * columns)), y = int(2u * row);
+    vec3 a = texture_pixel(texture, x, y);
+    return a + (texture_pixel(texture, x + 1, y) - a) * barycentric.x + (texture_pixel(texture, x, y + 1) - a) * barycentric.y;
+}
+
 // The gradient of the first channel of an image with bilinear filter, with respect to (u, v); 0 for what is no image.
 vec2 texture_gradient(Texture texture, vec2 uv) {
     if (texture.kind != TEXTURE_BITMAP) {

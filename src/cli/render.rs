@@ -5,8 +5,9 @@ use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
 use tyndall::image::{self, exr, preview};
+use tyndall::render::film::Film;
 use tyndall::render::session::{self, Options, Outcome, Rendered};
-use tyndall::render::{Backend, aov, picture};
+use tyndall::render::{Backend, aov, moments, picture};
 use tyndall::scene::Scene;
 
 use super::args::RenderArgs;
@@ -38,7 +39,9 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
         doubts(args, &scene);
     }
 
-    let mut backend = backend::open(&args.device, &scene, args.seed, !args.no_pilot, !args.no_sharing, &mut warn)?;
+    // Second moments are those of paths that belong to one pixel.
+    let sharing = !args.no_sharing && scene.moments.is_none();
+    let mut backend = backend::open(&args.device, &scene, args.seed, !args.no_pilot, sharing, &mut warn)?;
     // From here on a signal leads to an image. Before, it simply ends the program.
     let interrupt = interrupt::flag()?;
     render(args, &scene, spp, &mut *backend, &interrupt, &output)
@@ -77,7 +80,7 @@ fn render(
     if let Some(path) = &args.preview {
         preview::write_png(path, &image)?;
     }
-    let further = further_channels(args, scene, rendered.film.samples())?;
+    let further = further_channels(args, scene, &rendered.film)?;
     exr::write(output, &picture::finish(image, scene.film.pixel_format.colors, further))?;
 
     if !args.quiet {
@@ -94,12 +97,17 @@ fn render(
 }
 
 /// Channels that the scene asks for beside the radiance.
-fn further_channels(args: &RenderArgs, scene: &Scene, spp: u32) -> Result<Vec<(String, Vec<f32>)>, CliError> {
+fn further_channels(args: &RenderArgs, scene: &Scene, film: &Film) -> Result<Vec<(String, Vec<f32>)>, CliError> {
     let alpha = scene.film.pixel_format.alpha;
-    if scene.aovs.is_empty() && !alpha {
-        return Ok(Vec::new());
+    let mut channels = Vec::new();
+    if !scene.aovs.is_empty() || alpha {
+        let samples = film.samples().min(aov::AOV_SAMPLES);
+        channels = aov::render(&backend::pack(scene, args.seed)?, &scene.aovs, alpha, samples);
     }
-    Ok(aov::render(&backend::pack(scene, args.seed)?, &scene.aovs, alpha, spp.min(aov::AOV_SAMPLES)))
+    if let Some(name) = &scene.moments {
+        channels.extend(moments::channels(film, name));
+    }
+    Ok(channels)
 }
 
 /// Says that there are doubts about the scene, and where to read them.
@@ -115,6 +123,12 @@ fn doubts(args: &RenderArgs, scene: &Scene) {
 /// Hours of rendering should not end in an error that could be seen before, nor in the loss of the scene.
 fn check_paths(args: &RenderArgs, output: &Path) -> Result<(), CliError> {
     image::check_writable(output)?;
+    if !output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr")) {
+        return Err(CliError::Usage(format!(
+            "the image {} does not end in .exr: images are OpenEXR files; --preview OUT.png writes a PNG as well",
+            output.display()
+        )));
+    }
     if let Some(preview) = &args.preview {
         image::check_writable(preview)?;
         if same_file(preview, output) {

@@ -164,7 +164,8 @@ fn memory(scene: &Scene, packed: &Packed) -> Value {
         .sum();
     let crop = scene.film.crop;
     // Whether pixels share their paths is known only after a pilot run: the most that it may take.
-    let sharers = if tyndall::pilot::can_share_paths(&packed.features) { tyndall::pilot::MOST_SHARERS } else { 0 };
+    let may_share = scene.moments.is_none() && tyndall::pilot::can_share_paths(&packed.features);
+    let sharers = if may_share { tyndall::pilot::MOST_SHARERS } else { 0 };
     let (device_work, host_blocks) = backend::working_memory([crop.width, crop.height], sharers);
     // Sums and sums of squares of three channels in double precision.
     let film = u64::from(crop.width) * u64::from(crop.height) * size_of::<[[f64; 3]; 2]>() as u64;

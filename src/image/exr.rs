@@ -19,7 +19,8 @@ use super::{Attribute, Channel, Image, ImageError, Metadata, Window};
 pub fn write(path: &Path, image: &Image) -> Result<(), ImageError> {
     let metadata = &image.metadata;
     let channels = image.channels.iter().map(|channel| {
-        let exact = channel.name == "sampleCount" || channel.name.starts_with("Variance.");
+        let exact =
+            channel.name == "sampleCount" || ["Variance.", "m2_"].iter().any(|head| channel.name.starts_with(head));
         let samples = if metadata.half && !exact {
             openexr::FlatSamples::F16(channel.samples.iter().copied().map(openexr::f16::from_f32).collect())
         } else {

@@ -53,7 +53,7 @@ pub struct Features {
     pub many_lights: bool,
     /// A surface whose back is black.
     pub one_sided: bool,
-    /// Glass, smooth or rough.
+    /// Glass, smooth or rough, or another surface that refracts.
     pub dielectric: bool,
     /// Metal, smooth or rough.
     pub conductor: bool,
@@ -61,6 +61,8 @@ pub struct Features {
     pub plastic: bool,
     /// A diffuse body under a rough varnish.
     pub rough_plastic: bool,
+    /// The principled BSDF.
+    pub principled: bool,
     /// Colours or an opacity that depend on the place.
     pub textures: bool,
     /// Roughness that depends on the direction.
@@ -71,6 +73,10 @@ pub struct Features {
     pub masks: bool,
     /// Thin panes, which light passes as it passes holes.
     pub panes: bool,
+    /// Thin panes of a colour; they count among chromatic media.
+    pub tints: bool,
+    /// Colours that depend on the triangle and the place on it.
+    pub attributes: bool,
     /// Surfaces that only the far clip plane hides.
     pub far_clip: bool,
     /// Surfaces with more than one BSDF.
@@ -115,7 +121,11 @@ impl Features {
     pub fn of(scene: &Scene, packed: &Packed) -> Features {
         let Integrator { max_depth, rr_depth, hide_emitters } = scene.integrator;
         let emission = packed.media.iter().any(|medium| medium.emission != glam::Vec3::ZERO);
-        let media = emission || packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
+        let tints = packed.surfaces.iter().any(|surface| {
+            let colored = surface.transmittance != glam::Vec3::splat(surface.transmittance.x);
+            surface.flags & SURFACE_PANE != 0 && (colored || surface.textures_2 & 0xffff != 0)
+        });
+        let media = tints || emission || packed.media.iter().any(|medium| medium.sigma_t.max_element() > 0.0);
         let lowest = (1 << LIGHT_TEXTURE_SHIFT) - 1;
         let kind = |kind: u32| packed.lights.iter().any(|light| light.kind & lowest == kind);
         let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
@@ -124,7 +134,8 @@ impl Features {
         let max_depth = max_depth.unwrap_or(u32::MAX);
         Features {
             media,
-            chromatic: packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x))
+            chromatic: tints
+                || packed.media.iter().any(|medium| medium.sigma_t != glam::Vec3::splat(medium.sigma_t.x))
                 || scene.media.iter().any(|medium| match &medium.volumes.sigma_t {
                     Some(Volume::Grid(field)) => field.grid.channels() == 3,
                     _ => false,
@@ -150,10 +161,11 @@ impl Features {
             envmaps: kind(LIGHT_ENVMAP),
             many_lights: packed.lights.len() > 1,
             one_sided: packed.surfaces.iter().any(|surface| surface.flags & SURFACE_TWO_SIDED == 0),
-            dielectric: bsdf(BSDF_DIELECTRIC),
+            dielectric: bsdf(BSDF_DIELECTRIC) || flag(SURFACE_ORIENTED),
             conductor: bsdf(BSDF_CONDUCTOR),
             plastic: bsdf(BSDF_PLASTIC),
             rough_plastic: packed.surfaces.iter().any(|surface| surface.value_count != 0),
+            principled: bsdf(BSDF_PRINCIPLED),
             textures: packed.surfaces.iter().any(|surface| {
                 surface.textures_1 | surface.textures_2 | surface.share_texture | surface.relief_texture != 0
             }),
@@ -165,6 +177,11 @@ impl Features {
                 primitive.surface & PRIMITIVE_BOUNDARY == 0 && packed.surfaces[index as usize].flags & SURFACE_MASK != 0
             }),
             panes: flag(SURFACE_PANE),
+            tints,
+            attributes: packed
+                .textures
+                .iter()
+                .any(|texture| texture.flags & TEXTURE_ATTRIBUTE != 0 && texture.kind == TEXTURE_BITMAP),
             slides: packed.lights.iter().any(|light| light.texture != 0),
             far_clip: {
                 let eye = packed.params.camera_origin;
@@ -221,11 +238,14 @@ impl Features {
             conductor: true,
             plastic: true,
             rough_plastic: true,
+            principled: true,
             textures: true,
             anisotropic: true,
             shading_normals: true,
             masks: true,
             panes: true,
+            tints: true,
+            attributes: true,
             slides: true,
             far_clip: true,
             tree: true,
@@ -267,14 +287,17 @@ impl Features {
             ("HAS_DIELECTRIC", self.dielectric),
             ("HAS_CONDUCTOR", self.conductor),
             ("HAS_PLASTIC", self.plastic),
-            ("HAS_LOBES", self.dielectric || self.conductor || self.plastic),
+            ("HAS_LOBES", self.dielectric || self.conductor || self.plastic || self.principled),
             ("HAS_ROUGH_PLASTIC", self.rough_plastic),
+            ("HAS_PRINCIPLED", self.principled),
             ("HAS_TEXTURES", self.textures),
             ("HAS_ANISOTROPIC", self.anisotropic),
             ("HAS_UVS", self.textures || self.anisotropic),
             ("HAS_SHADING_NORMALS", self.shading_normals),
             ("HAS_MASK", self.masks),
             ("HAS_PANES", self.panes),
+            ("HAS_TINTS", self.tints),
+            ("HAS_ATTRIBUTES", self.attributes),
             ("HAS_SLIDES", self.slides),
             ("HAS_FAR_CLIP", self.far_clip),
             ("HAS_BLENDS", self.blends),

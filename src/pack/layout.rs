@@ -497,6 +497,8 @@ pub const BSDF_DIELECTRIC: u32 = 1;
 pub const BSDF_CONDUCTOR: u32 = 2;
 /// Kind of BSDF: a diffuse body under a smooth or rough varnish.
 pub const BSDF_PLASTIC: u32 = 3;
+/// Kind of BSDF: the principled one, whose parameters stand where `lib/principled.glsl` says.
+pub const BSDF_PRINCIPLED: u32 = 4;
 /// [`Phase::kind`]: Henyey and Greenstein's.
 pub const PHASE_HENYEY_GREENSTEIN: u32 = 0;
 /// [`Phase::kind`]: Rayleigh's.
@@ -513,6 +515,8 @@ pub const TEXTURE_NEAREST: u32 = 1;
 pub const TEXTURE_MIRROR: u32 = 2;
 /// Bit 2: outside of the unit square the pixels at the edge go on. With neither bit, the image is repeated.
 pub const TEXTURE_CLAMP: u32 = 4;
+/// Bit 3: numbers of the triangles of a mesh, a block of 2 × 2 pixels for each.
+pub const TEXTURE_ATTRIBUTE: u32 = 8;
 /// [`Light::kind`]: a triangle.
 pub const LIGHT_TRIANGLE: u32 = 0;
 /// [`Light::kind`]: a parallelogram.
@@ -604,6 +608,7 @@ pub fn glsl() -> String {
         ("BSDF_DIELECTRIC", BSDF_DIELECTRIC),
         ("BSDF_CONDUCTOR", BSDF_CONDUCTOR),
         ("BSDF_PLASTIC", BSDF_PLASTIC),
+        ("BSDF_PRINCIPLED", BSDF_PRINCIPLED),
         ("PHASE_HENYEY_GREENSTEIN", PHASE_HENYEY_GREENSTEIN),
         ("PHASE_RAYLEIGH", PHASE_RAYLEIGH),
         ("PHASE_TABULATED", PHASE_TABULATED),
@@ -612,6 +617,7 @@ pub fn glsl() -> String {
         ("TEXTURE_NEAREST", TEXTURE_NEAREST),
         ("TEXTURE_MIRROR", TEXTURE_MIRROR),
         ("TEXTURE_CLAMP", TEXTURE_CLAMP),
+        ("TEXTURE_ATTRIBUTE", TEXTURE_ATTRIBUTE),
         ("LIGHT_TRIANGLE", LIGHT_TRIANGLE),
         ("LIGHT_QUAD", LIGHT_QUAD),
         ("LIGHT_SPHERE", LIGHT_SPHERE),

@@ -59,6 +59,7 @@ fn pack_part(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) ->
                 ..rough(smooth, roughness)
             }
         }
+        Bsdf::Principled { parameters, two_sided } => super::principled::pack(parameters, *two_sided, color),
         // What is left is nothing at all, or has parts that `pack_chain` puts together.
         Bsdf::Null | Bsdf::Mask { .. } | Bsdf::Blend { .. } | Bsdf::Sides { .. } | Bsdf::Relief { .. } => hole(),
     }
@@ -118,16 +119,13 @@ pub fn pack_chain(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32
     }
 }
 
-/// The surfaces of a shape's BSDF, see [`pack_chain`]. Light that passes a pane of no colour goes on as if nothing had been there, as it does
+/// The surfaces of a shape's BSDF, see [`pack_chain`]. Light that passes a pane goes on as if nothing had been there, as it does
 /// through masks: that is no event, and shadow rays pass as well.
 pub fn pack_bsdf(bsdf: &Bsdf, textures: &mut TextureTable, values: &mut Vec<f32>) -> Vec<Surface> {
     let mut chain = pack_chain(bsdf, textures, values);
-    if let Bsdf::ThinDielectric { specular_transmittance, .. } = bsdf
-        && let Some(transmittance) = specular_transmittance.constant()
-        && transmittance == DVec3::splat(transmittance.x)
-    {
+    if matches!(bsdf, Bsdf::ThinDielectric { .. }) {
         chain[0].flags |= SURFACE_PANE | SURFACE_MASK;
-        chain[0].opacity = transmittance.x as f32;
+        chain[0].opacity = chain[0].transmittance.max_element();
     }
     chain
 }
@@ -143,6 +141,7 @@ pub fn lets_shadow_rays_through(bsdf: &Bsdf) -> bool {
             | Bsdf::RoughConductor { .. }
             | Bsdf::Plastic { .. }
             | Bsdf::RoughPlastic { .. }
+            | Bsdf::Principled { .. }
     );
     !opaque
 }
@@ -161,12 +160,12 @@ fn hole() -> Surface {
     Surface { flags: SURFACE_TWO_SIDED | SURFACE_MASK, opacity: 0.0, ..Surface::default() }
 }
 
-fn side(two_sided: bool) -> u32 {
+pub(super) fn side(two_sided: bool) -> u32 {
     if two_sided { SURFACE_TWO_SIDED } else { 0 }
 }
 
 /// A colour, and its texture.
-type Color = (Vec3, u32);
+pub(super) type Color = (Vec3, u32);
 
 fn glass(eta: f64, [reflectance, transmittance]: [Color; 2], flags: u32) -> Surface {
     Surface {

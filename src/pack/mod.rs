@@ -17,6 +17,7 @@ pub mod lights;
 pub mod material;
 pub mod nesting;
 pub mod phase;
+mod principled;
 pub mod sealed;
 pub mod sky;
 pub mod slide;
@@ -323,11 +324,14 @@ const EMPTY_FEATURES: Features = Features {
     conductor: false,
     plastic: false,
     rough_plastic: false,
+    principled: false,
     textures: false,
     anisotropic: false,
     shading_normals: false,
     masks: false,
     panes: false,
+    tints: false,
+    attributes: false,
     slides: false,
     far_clip: false,
     blends: false,
@@ -405,7 +409,8 @@ fn pack_surfaces(
     let mut chain = material::pack_bsdf(&shape.bsdf, textures, values);
     let smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
     let smooth = if smooth && !material::is_null(&shape.bsdf) { SURFACE_SMOOTH } else { 0 };
-    let uvs = if shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };
+    let looked_up = shape.bsdf.textures().iter().any(|texture| texture.constant().is_none());
+    let uvs = if looked_up || shape.bsdf.needs_uvs().is_some() { SURFACE_UVS } else { 0 };
     for surface in &mut chain {
         surface.flags |= smooth | uvs;
         surface.sigma_t_step = media[inside as usize].sigma_t - media[outside as usize].sigma_t;

@@ -62,7 +62,8 @@ pub fn before_spot(texture: &Texture, cutoff: f64) -> Texture {
 fn over(texture: &Texture, first: DAffine2) -> Texture {
     let mut texture = texture.clone();
     match &mut texture {
-        Texture::Constant(_) => {}
+        // Lights have no attributes of meshes: the reader refuses them.
+        Texture::Constant(_) | Texture::Attribute { .. } => {}
         Texture::Bitmap { to_uv, .. } | Texture::Checkerboard { to_uv, .. } => *to_uv *= first,
     }
     texture

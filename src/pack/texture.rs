@@ -1,7 +1,8 @@
 //! The table of textures, and what a shape's primitives carry for them: texture coordinates and shading normals.
 
 use super::layout::{
-    Corners, TEXTURE_BITMAP, TEXTURE_CHECKERBOARD, TEXTURE_CLAMP, TEXTURE_MIRROR, TEXTURE_NEAREST, Texture,
+    Corners, TEXTURE_ATTRIBUTE, TEXTURE_BITMAP, TEXTURE_CHECKERBOARD, TEXTURE_CLAMP, TEXTURE_MIRROR, TEXTURE_NEAREST,
+    Texture,
 };
 use crate::scene::{self, Bitmap, Filter, Geometry, Shape, Wrap};
 use glam::{DAffine2, DVec3, Vec3};
@@ -70,8 +71,18 @@ impl TextureTable {
                     first_value: self.first_value(bitmap, values),
                     ..placed(to_uv)
                 };
-                let sum: DVec3 = bitmap.pixels().iter().map(|pixel| Vec3::from(*pixel).as_dvec3()).sum();
-                (sum / bitmap.pixels().len() as f64, entry)
+                (mean(bitmap), entry)
+            }
+            scene::Texture::Attribute { bitmap } => {
+                let entry = Texture {
+                    kind: TEXTURE_BITMAP,
+                    flags: TEXTURE_CLAMP | TEXTURE_ATTRIBUTE,
+                    width: bitmap.width(),
+                    height: bitmap.height(),
+                    first_value: self.first_value(bitmap, values),
+                    ..placed(&DAffine2::IDENTITY)
+                };
+                (mean(bitmap), entry)
             }
         };
         // The same texture on many shapes is one entry.
@@ -93,6 +104,11 @@ impl TextureTable {
         self.images.push((bitmap.clone(), first));
         first
     }
+}
+
+fn mean(bitmap: &Bitmap) -> DVec3 {
+    let sum: DVec3 = bitmap.pixels().iter().map(|pixel| Vec3::from(*pixel).as_dvec3()).sum();
+    sum / bitmap.pixels().len() as f64
 }
 
 /// An entry with nothing but its transform.

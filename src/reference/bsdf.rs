@@ -35,7 +35,7 @@ pub struct BsdfSample {
 }
 
 /// No direction.
-const NO_SAMPLE: BsdfSample = BsdfSample { direction: DVec3::Z, weight: DVec3::ZERO, pdf: 0.0, eta: 1.0 };
+pub(super) const NO_SAMPLE: BsdfSample = BsdfSample { direction: DVec3::Z, weight: DVec3::ZERO, pdf: 0.0, eta: 1.0 };
 
 /// Fresnel's equations, unpolarised, and the cosine of refraction with the sign opposite to `cos_i`, which is positive
 /// outside; `eta` is the index inside over the one outside.

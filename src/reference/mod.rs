@@ -26,6 +26,7 @@ pub mod path_state;
 pub mod path_surface;
 pub mod path_vertex;
 pub mod phase;
+pub mod principled;
 pub mod ray;
 pub mod rng;
 pub mod sampler;

@@ -7,7 +7,7 @@ use super::camera::{camera_direction, focused_direction, lens_point};
 use super::film::{group_offset, group_size};
 use super::filter::sample_filter;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
-use super::medium::channel_weights;
+use super::medium::{channel_weights, sample_channel};
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
 use super::path_aim::{find_aim, sample_next};
 use super::path_flight::{
@@ -23,13 +23,13 @@ use super::path_state::{
     survived_throughput,
 };
 use super::path_surface::{
-    Place, apply_textures, opacity_at, shading_normal, share_at, surface_tangent, texture_coordinates, turn_frame,
+    Place, apply_textures, opacity_at, pane_depth, shading_normal, share_at, surface_tangent, turn_frame,
 };
 use super::path_vertex::{Vertex, medium_towards, offset_origin, sides_agree, surface_point, to_surface_frame};
 use super::ray::offset_distance;
 use crate::pack::layout::{
     LIGHT_VOLUME, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED,
-    SURFACE_MASK, SURFACE_ORIENTED, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
+    SURFACE_MASK, SURFACE_ORIENTED, SURFACE_PANE, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
 };
 use glam::{DVec2, DVec3, UVec2, Vec4Swizzles};
 
@@ -205,10 +205,27 @@ fn cross_surface(tables: &Tables, path: &mut Path, surface: &Surface, hit: &Hit)
 /// Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
 fn passes_mask(tables: &Tables, path: &mut Path, surface: &Surface, place: &Place) -> bool {
     let opacity = opacity_at(tables, surface, place, path.direction);
-    let u = sample_set(tables, path, MASK_SETS + path.crossings).x;
+    let u = sample_set(tables, path, MASK_SETS + path.crossings).z; // the sets are those of emission as well, which takes the first
     path.crossings += 1;
     path.passed *= 1.0 - opacity;
     u >= opacity
+}
+
+/// Goes on behind a coloured pane, whose colour is an optical depth of the flight; but no flight ends there. Instead the channel is chosen
+/// anew by what is left of each, and the throughput loses what all of them lose together.
+fn cross_pane(tables: &Tables, path: &mut Path, depth: DVec3) {
+    if max_component(depth) == 0.0 {
+        return;
+    }
+    let weights = channel_weights(path.throughput);
+    let before = weights.dot(exp_minus_rgb(path.tau_rgb));
+    path.tau_rgb += depth;
+    path.tau_mean += depth;
+    let left = weights * exp_minus_rgb(path.tau_rgb);
+    let sum = left.element_sum();
+    path.throughput *= sum / before;
+    path.alive = sum > 0.0;
+    path.channel = sample_channel(left / sum, sample_set(tables, path, MASK_SETS + path.crossings).w);
 }
 
 /// The one of the BSDFs of a surface that acts at this vertex: by the side, or by chance.
@@ -300,6 +317,9 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         crosses = surface.flags & SURFACE_MASK != 0 && passes_mask(tables, path, surface, &place);
     }
     if crosses {
+        if surface.flags & SURFACE_PANE != 0 {
+            cross_pane(tables, path, pane_depth(tables, surface, &place));
+        }
         path.anchor = point;
         cross_surface(tables, path, surface, hit);
         return None;
@@ -324,7 +344,7 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     }
     let mut surface = *surface;
     if surface.textures_1 | surface.textures_2 & 0xffff != 0 {
-        apply_textures(tables, &mut surface, texture_coordinates(tables, &place));
+        apply_textures(tables, &mut surface, &place);
     }
     path.offset = offset_distance(largest);
     path.normal = normal;
@@ -355,6 +375,11 @@ fn advance_shadow(tables: &Tables, path: &mut Path, hit: &mut Hit) -> bool {
         let point = path.origin + path.direction * hit.t;
         let place = Place { index: hit.primitive, point, barycentric: hit.barycentric };
         path.passed *= 1.0 - opacity_at(tables, surface, &place, path.direction);
+        if surface.flags & SURFACE_PANE != 0 {
+            let depth = pane_depth(tables, surface, &place);
+            path.tau_rgb += depth;
+            path.tau_mean += depth;
+        }
     }
     let t_max = path.t_max;
     cross_surface(tables, path, surface, hit);

@@ -3,9 +3,9 @@
 use super::bindings::Tables;
 use super::path_flight::near_distance;
 use super::path_state::{Hit, INFINITE_DISTANCE, NONE, Path, medium_at};
-use super::path_surface::{Place, opacity_at};
+use super::path_surface::{Place, opacity_at, pane_depth};
 use super::ray::{Ray, TriangleHit, intersect_sphere, intersect_triangle};
-use crate::pack::layout::{PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_MASK};
+use crate::pack::layout::{PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_MASK, SURFACE_PANE};
 use glam::{DVec2, DVec3};
 
 /// The length L of a shadow ray in its optical depth σ₀ L + Σ (σ after − σ before) (L − t). Where an infinite ray ends in
@@ -84,6 +84,9 @@ pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit:
             let place = Place { index, point: path.origin + path.direction * t, barycentric };
             let opacity = opacity_at(tables, surface, &place, path.direction);
             hit.passed *= 1.0 - opacity;
+            if surface.flags & SURFACE_PANE != 0 {
+                hit.tau_rgb += pane_depth(tables, surface, &place);
+            }
             opaque = opacity >= 1.0;
             boundary = true;
         }

@@ -2,11 +2,11 @@
 
 use super::bindings::{Primitive, Surface, Tables};
 use super::bsdf::pane_reflectance;
-use super::math::{arctan2, orthonormal_frame};
-use super::texture::{eval_texture, texture_gradient};
+use super::math::{arctan2, max_component, orthonormal_frame};
+use super::texture::{eval_attribute, eval_texture, texture_gradient};
 use crate::pack::layout::{
     PRIMITIVE_SPHERE, SURFACE_HEIGHTS, SURFACE_INVERTED, SURFACE_PANE, SURFACE_RELIEF_FADES, SURFACE_RELIEF_FLIPS,
-    SURFACE_RELIEF_TURNS, SURFACE_SMOOTH,
+    SURFACE_RELIEF_TURNS, SURFACE_SMOOTH, TEXTURE_ATTRIBUTE,
 };
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
@@ -48,6 +48,35 @@ pub fn texture_coordinates(tables: &Tables, place: &Place) -> DVec2 {
     DVec2::new(u.dot(weights), corners.v.as_dvec3().dot(weights))
 }
 
+/// Optical depth at which a share is left. What is not there at all is out of reach for any flight.
+fn color_depth(share: f64) -> f64 {
+    if share > 1e-30 { -share.min(1.0).ln() } else { 1000.0 }
+}
+
+/// A colour at a place on a primitive; `texture` is its index plus one.
+fn texture_at(tables: &Tables, texture: u32, place: &Place) -> DVec3 {
+    let texture = &tables.textures[texture as usize - 1];
+    if texture.flags & TEXTURE_ATTRIBUTE != 0 {
+        let number = tables.corners[place.index as usize].number;
+        return eval_attribute(texture, &tables.values, number, place.barycentric);
+    }
+    eval_texture(texture, &tables.values, texture_coordinates(tables, place))
+}
+
+/// What a thin pane leaves of the light that it does not reflect.
+fn pane_transmittance(tables: &Tables, surface: &Surface, place: &Place) -> DVec3 {
+    match surface.textures_2 & 0xffff {
+        0 => surface.transmittance,
+        texture => texture_at(tables, texture, place),
+    }
+}
+
+/// The colour of a thin pane as an optical depth of each channel, 0 for the one that it leaves the most of: of the rest [`opacity_at`] knows.
+pub fn pane_depth(tables: &Tables, surface: &Surface, place: &Place) -> DVec3 {
+    let color = pane_transmittance(tables, surface, place);
+    (color / max_component(color).max(1e-30)).map(color_depth)
+}
+
 /// Probability that light in a direction meets a surface that it may also pass: a mask, or a thin pane, of which `opacity` says how
 /// much of the light is left that it does not reflect.
 pub fn opacity_at(tables: &Tables, surface: &Surface, place: &Place, direction: DVec3) -> f64 {
@@ -60,25 +89,29 @@ pub fn opacity_at(tables: &Tables, surface: &Surface, place: &Place, direction: 
         };
         let smooth = surface.flags & SURFACE_SMOOTH != 0;
         let normal = if smooth { shading_normal(tables, place, normal) } else { normal };
-        return 1.0 - (1.0 - pane_reflectance(normal.dot(direction), surface.eta)) * surface.opacity;
+        let textured = surface.textures_2 & 0xffff != 0;
+        let most = if textured { max_component(pane_transmittance(tables, surface, place)) } else { surface.opacity };
+        return 1.0 - (1.0 - pane_reflectance(normal.dot(direction), surface.eta)) * most;
     }
     let texture = surface.textures_2 >> 16;
     if texture == 0 {
         return surface.opacity;
     }
-    let uv = texture_coordinates(tables, place);
-    eval_texture(&tables.textures[texture as usize - 1], &tables.values, uv).x.clamp(0.0, 1.0)
+    texture_at(tables, texture, place).x.clamp(0.0, 1.0)
 }
 
 /// Puts the colours at a place in the place of their means.
-pub fn apply_textures(tables: &Tables, surface: &mut Surface, uv: DVec2) {
+pub fn apply_textures(tables: &Tables, surface: &mut Surface, place: &Place) {
     let color = |texture: u32, mean: DVec3| match texture {
         0 => mean,
-        texture => eval_texture(&tables.textures[texture as usize - 1], &tables.values, uv),
+        texture => texture_at(tables, texture, place),
     };
     surface.reflectance = color(surface.textures_1 & 0xffff, surface.reflectance);
     surface.specular = color(surface.textures_1 >> 16, surface.specular);
     surface.transmittance = color(surface.textures_2 & 0xffff, surface.transmittance);
+    if surface.flags & SURFACE_PANE != 0 && surface.textures_2 & 0xffff != 0 {
+        surface.opacity = max_component(surface.transmittance);
+    }
 }
 
 /// The normal of the BSDF's frame: that of the surface, or the interpolated one.
@@ -114,9 +147,7 @@ pub fn share_at(tables: &Tables, surface: &Surface, place: &Place) -> f64 {
     if surface.share_texture == 0 {
         return surface.share;
     }
-    let uv = texture_coordinates(tables, place);
-    let share =
-        eval_texture(&tables.textures[surface.share_texture as usize - 1], &tables.values, uv).x.clamp(0.0, 1.0);
+    let share = texture_at(tables, surface.share_texture, place).x.clamp(0.0, 1.0);
     if surface.flags & SURFACE_INVERTED != 0 { 1.0 - share } else { share }
 }
 

@@ -1,14 +1,16 @@
 //! Mirror of `shaders/lib/path_vertex.glsl`: where a path scatters, in a medium or on a surface.
 
 use super::bindings::{Primitive, Surface, Tables};
+use super::bsdf::bsdf_kind;
 use super::bsdf::{BsdfSample, BsdfValue, eval_bsdf, sample_bsdf};
 use super::math::{from_frame, max_component};
 use super::medium::{medium_code, medium_of_code};
 use super::path_state::{Hit, NONE, Path};
 use super::path_surface::relief_fading;
 use super::phase::{PhaseTables, eval_henyey_greenstein, eval_mixture, sample_henyey_greenstein, sample_mixture};
+use super::principled::{eval_principled, sample_principled};
 use super::warp::from_polar;
-use crate::pack::layout::{PRIMITIVE_SPHERE, SURFACE_ORIENTED};
+use crate::pack::layout::{BSDF_PRINCIPLED, PRIMITIVE_SPHERE, SURFACE_ORIENTED};
 use glam::{DVec2, DVec3};
 
 /// A point where light is scattered, in a medium or on a surface.
@@ -59,6 +61,22 @@ fn phase_tables(tables: &Tables) -> PhaseTables<'_> {
     PhaseTables { phases: &tables.phases, values: &tables.values }
 }
 
+/// What a surface does to light, whatever its kind. `values` holds the tables of surfaces.
+pub fn eval_surface(surface: &Surface, values: &[f32], wi: DVec3, wo: DVec3) -> BsdfValue {
+    match bsdf_kind(surface) {
+        BSDF_PRINCIPLED => eval_principled(surface, wi, wo),
+        _ => eval_bsdf(surface, values, wi, wo),
+    }
+}
+
+/// A direction in which light goes on from a surface, in the local frame.
+pub fn sample_surface(surface: &Surface, values: &[f32], wi: DVec3, u: DVec2, lobe: f64) -> BsdfSample {
+    match bsdf_kind(surface) {
+        BSDF_PRINCIPLED => sample_principled(surface, wi, u, lobe),
+        _ => sample_bsdf(surface, values, wi, u, lobe),
+    }
+}
+
 /// Scattering function times cosine, and the density with which directions are sampled.
 pub fn eval_scattering(tables: &Tables, vertex: &Vertex, direction: DVec3) -> BsdfValue {
     if vertex.in_medium {
@@ -73,7 +91,7 @@ pub fn eval_scattering(tables: &Tables, vertex: &Vertex, direction: DVec3) -> Bs
     if !sides_agree(vertex, local.z, direction) {
         return BsdfValue::default();
     }
-    let found = eval_bsdf(&vertex.surface, &tables.values, vertex.incident, local);
+    let found = eval_surface(&vertex.surface, &tables.values, vertex.incident, local);
     BsdfValue { value: found.value * fading(vertex, direction), ..found }
 }
 
@@ -96,7 +114,7 @@ pub fn sample_scattering(tables: &Tables, vertex: &Vertex, u: DVec2, lobe: f64) 
         let pdf = eval_scattering(tables, vertex, direction).pdf;
         return BsdfSample { direction, weight: vertex.albedo, pdf, eta: 1.0 };
     }
-    let found = sample_bsdf(&vertex.surface, &tables.values, vertex.incident, u, lobe);
+    let found = sample_surface(&vertex.surface, &tables.values, vertex.incident, u, lobe);
     let direction = from_surface_frame(vertex.tangent, vertex.axis, found.direction);
     if !sides_agree(vertex, found.direction.z, direction) {
         return BsdfSample { direction, weight: DVec3::ZERO, pdf: 0.0, ..found };

@@ -51,6 +51,14 @@ pub fn eval_texture(texture: &Texture, values: &[f32], uv: DVec2) -> DVec3 {
     upper.lerp(lower, share.y)
 }
 
+/// The numbers that a mesh has at a place on one of its triangles, which have blocks of 2 × 2 pixels in rows: those of the corners first.
+pub fn eval_attribute(texture: &Texture, values: &[f32], triangle: u32, barycentric: DVec2) -> DVec3 {
+    let columns = texture.width / 2;
+    let (x, y) = ((2 * (triangle % columns)) as i32, (2 * (triangle / columns)) as i32);
+    let [a, b, c] = [(x, y), (x + 1, y), (x, y + 1)].map(|(x, y)| texture_pixel(texture, values, x, y));
+    a + (b - a) * barycentric.x + (c - a) * barycentric.y
+}
+
 /// The gradient of the first channel of an image with bilinear filter, with respect to (u, v); 0 for what is no image.
 pub fn texture_gradient(texture: &Texture, values: &[f32], uv: DVec2) -> DVec2 {
     if texture.kind != TEXTURE_BITMAP {

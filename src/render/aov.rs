@@ -3,7 +3,7 @@
 
 use super::BLOCK_SAMPLES;
 use crate::pack::Packed;
-use crate::pack::layout::{BSDF_DIFFUSE, BSDF_PLASTIC, SURFACE_KIND_SHIFT, SURFACE_SMOOTH};
+use crate::pack::layout::{BSDF_DIFFUSE, BSDF_PLASTIC, BSDF_PRINCIPLED, SURFACE_KIND_SHIFT, SURFACE_SMOOTH};
 use crate::reference::bindings::Tables;
 use crate::reference::math::exp_minus_rgb;
 use crate::reference::path::{Hit, NONE, Path, path_start};
@@ -87,11 +87,11 @@ fn first_hit(packed: &Packed, tables: &Tables, mut path: Path, aovs: &[Aov]) -> 
             AovKind::Albedo => {
                 let mut surface = *surface;
                 if surface.textures_1 != 0 {
-                    apply_textures(tables, &mut surface, texture_coordinates(tables, &place));
+                    apply_textures(tables, &mut surface, &place);
                 }
                 let kind = surface.flags >> SURFACE_KIND_SHIFT;
                 let boundary = primitive.surface & crate::pack::layout::PRIMITIVE_BOUNDARY != 0;
-                let diffuse = !boundary && matches!(kind, BSDF_DIFFUSE | BSDF_PLASTIC);
+                let diffuse = !boundary && matches!(kind, BSDF_DIFFUSE | BSDF_PLASTIC | BSDF_PRINCIPLED);
                 values.extend(if diffuse { surface.reflectance } else { DVec3::ZERO }.to_array());
             }
         }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 pub mod aov;
 pub mod film;
+pub mod moments;
 pub mod picture;
 pub mod reconstruct;
 pub mod scene_hash;

@@ -12,7 +12,7 @@ use crate::scene::{Film, Scene};
 /// pixels.
 pub fn scene_hash(scene: &Scene) -> String {
     // Taken apart without `..`, so that a new field cannot be forgotten here.
-    let Scene { camera, film, integrator, shapes, media, lights, aovs: _, sample_count: _ } = scene;
+    let Scene { camera, film, integrator, shapes, media, lights, aovs: _, moments: _, sample_count: _ } = scene;
     let Film { width, height, crop: _, filter, sample_area, pixel_format: _ } = film;
     let mut hash = Fnv1a(0xcbf2_9ce4_8422_2325);
     let parts: [&dyn Debug; 9] = [camera, width, height, integrator, shapes, media, lights, filter, sample_area];

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Texture;
+use super::{Principled, Texture};
 
 /// What a surface does to light. The interior is the side that the normals point away from, the exterior the other one.
 ///
@@ -113,6 +113,13 @@ pub enum Bsdf {
         /// Reflects on both sides; otherwise the back is black.
         two_sided: bool,
     },
+    /// Burley's (2012, 2015) principled BSDF.
+    Principled {
+        /// What it is like.
+        parameters: Principled,
+        /// Reflects on both sides; otherwise the back is black, or clear where light is let through.
+        two_sided: bool,
+    },
     /// Two models in one place: the second counts with the weight, the first with what is left of 1.
     Blend {
         /// In \[0, 1\], gray: its three channels are the same.
@@ -207,6 +214,7 @@ impl Bsdf {
             Bsdf::RoughConductor { .. } => "roughconductor",
             Bsdf::Plastic { .. } => "plastic",
             Bsdf::RoughPlastic { .. } => "roughplastic",
+            Bsdf::Principled { .. } => "principled",
             Bsdf::Mask { .. } => "mask",
             Bsdf::Blend { .. } => "blendbsdf",
             Bsdf::Sides { .. } => "twosided",
@@ -223,7 +231,8 @@ impl Bsdf {
             | Bsdf::Conductor { two_sided, .. }
             | Bsdf::RoughConductor { two_sided, .. }
             | Bsdf::Plastic { two_sided, .. }
-            | Bsdf::RoughPlastic { two_sided, .. } => !two_sided,
+            | Bsdf::RoughPlastic { two_sided, .. }
+            | Bsdf::Principled { two_sided, .. } => !two_sided,
             Bsdf::Dielectric { .. } | Bsdf::RoughDielectric { .. } => true,
             Bsdf::Mask { nested, .. } | Bsdf::Relief { nested, .. } => nested.sides_differ(),
             Bsdf::Blend { first, second, .. } => first.sides_differ() || second.sides_differ(),
@@ -239,6 +248,7 @@ impl Bsdf {
             | Bsdf::RoughConductor { two_sided, .. }
             | Bsdf::Plastic { two_sided, .. }
             | Bsdf::RoughPlastic { two_sided, .. } => *two_sided = true,
+            Bsdf::Principled { parameters, two_sided } if !parameters.refracts() => *two_sided = true,
             Bsdf::Blend { first, second, .. } => {
                 **first = (**first).clone().two_sided()?;
                 **second = (**second).clone().two_sided()?;
@@ -266,6 +276,7 @@ impl Bsdf {
             | Bsdf::RoughPlastic { diffuse_reflectance, specular_reflectance, .. } => {
                 vec![diffuse_reflectance, specular_reflectance]
             }
+            Bsdf::Principled { parameters, .. } => vec![&parameters.base_color, &parameters.roughness],
             Bsdf::Mask { opacity, nested } => [nested.textures(), vec![opacity]].concat(),
             Bsdf::Blend { weight, first, second } => [first.textures(), second.textures(), vec![weight]].concat(),
             Bsdf::Sides { front, back } => [front.textures(), back.textures()].concat(),
@@ -282,6 +293,7 @@ impl Bsdf {
             Bsdf::RoughDielectric { roughness, .. } | Bsdf::RoughConductor { roughness, .. } => {
                 roughness.is_anisotropic()
             }
+            Bsdf::Principled { parameters, .. } => parameters.anisotropic > 0.0,
             Bsdf::Mask { nested, .. } => nested.needs_tangents(),
             Bsdf::Blend { first, second, .. } | Bsdf::Sides { front: first, back: second } => {
                 first.needs_tangents() || second.needs_tangents()
@@ -297,6 +309,7 @@ impl Bsdf {
             Bsdf::RoughDielectric { roughness, .. } | Bsdf::RoughConductor { roughness, .. } => {
                 roughness.is_anisotropic()
             }
+            Bsdf::Principled { parameters, .. } => parameters.anisotropic > 0.0,
             Bsdf::Mask { nested, .. } if nested.needs_uvs().is_some() => return nested.needs_uvs(),
             Bsdf::Blend { first, second, .. } | Bsdf::Sides { front: first, back: second }
                 if first.needs_uvs().or(second.needs_uvs()).is_some() =>
@@ -306,7 +319,7 @@ impl Bsdf {
             Bsdf::Relief { .. } => return Some("a map of normals or heights"),
             _ => false,
         };
-        if self.textures().iter().any(|texture| texture.constant().is_none()) {
+        if self.textures().iter().any(|texture| texture.needs_uvs()) {
             Some("a texture")
         } else {
             anisotropic.then_some("anisotropic roughness")

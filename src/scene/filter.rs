@@ -82,6 +82,13 @@ impl ReconstructionFilter {
     }
 }
 
+impl ReconstructionFilter {
+    /// Whether some samples count negatively.
+    pub fn has_negative_lobes(&self) -> bool {
+        (0..=1000).any(|step| self.eval(self.radius() * f64::from(step) / 1000.0) < 0.0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,6 +114,7 @@ mod tests {
                 assert_eq!(got, filter.eval(-x));
             }
             assert_eq!(filter.eval(filter.radius() + 1e-3), 0.0);
+            assert_eq!(filter.has_negative_lobes(), expected.iter().any(|value| *value < 0.0), "{filter:?}");
         }
     }
 }

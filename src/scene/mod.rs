@@ -28,6 +28,7 @@ pub mod mesh;
 pub mod mitsuba;
 mod output;
 mod phase;
+mod principled;
 pub mod spectrum;
 mod texture;
 mod vdb;
@@ -40,6 +41,7 @@ pub use error::SceneError;
 pub use filter::ReconstructionFilter;
 pub use output::{Aov, AovKind, Colors, PixelFormat};
 pub use phase::Phase;
+pub use principled::Principled;
 pub use texture::{Filter, Texture, Wrap};
 pub use volume::{Grid, GridVolume, HeightVolume, Volume, Volumes};
 pub use volume_formats::GridFile;
@@ -65,6 +67,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Channels that are written beside the radiance.
     pub aovs: Vec<Aov>,
+    /// Name of the channels with second moments of the samples, if these are asked for.
+    pub moments: Option<String>,
     /// Samples a pixel that the scene asks for; the command line may ask for others.
     pub sample_count: u32,
 }
@@ -80,6 +84,7 @@ impl Scene {
             media: Vec::new(),
             lights: Vec::new(),
             aovs: Vec::new(),
+            moments: None,
             sample_count: 16,
         }
     }

@@ -22,6 +22,11 @@ pub enum Texture {
         /// Applied to the surface's coordinates before the look-up.
         to_uv: DAffine2,
     },
+    /// Numbers that a mesh file gives to vertices or faces, looked up by the triangle and the place on it rather than by texture coordinates.
+    Attribute {
+        /// For each triangle of the shape's mesh a block of 2 × 2 pixels: see [`super::mesh::attributes`].
+        bitmap: Arc<Bitmap>,
+    },
     /// Squares of side 1/2 in turn: `color0` where the fractional parts of u and v are both above 1/2 or both not.
     Checkerboard {
         /// The colour at (0, 0).
@@ -84,7 +89,12 @@ impl Texture {
         }
     }
 
-    /// The colour at texture coordinates. This is the definition that renderers follow; conventions of Mitsuba 3.9.1.
+    /// Whether it is looked up by texture coordinates.
+    pub fn needs_uvs(&self) -> bool {
+        matches!(self, Texture::Bitmap { .. } | Texture::Checkerboard { .. })
+    }
+
+    /// The colour at texture coordinates; of an attribute, at coordinates in its image. This is the definition that renderers follow; conventions of Mitsuba 3.9.1.
     pub fn eval(&self, uv: DVec2) -> DVec3 {
         match self {
             Texture::Constant(color) => *color,
@@ -92,6 +102,10 @@ impl Texture {
                 let uv = to_uv.transform_point2(uv);
                 let above = (uv - uv.floor()).cmpgt(DVec2::splat(0.5));
                 if above.x == above.y { *color0 } else { *color1 }
+            }
+            Texture::Attribute { bitmap } => {
+                let (filter, wrap, to_uv) = (Filter::Bilinear, Wrap::Clamp, DAffine2::IDENTITY);
+                Texture::Bitmap { bitmap: bitmap.clone(), filter, wrap, to_uv }.eval(uv)
             }
             Texture::Bitmap { bitmap, filter, wrap, to_uv } => {
                 let size = DVec2::new(f64::from(bitmap.width()), f64::from(bitmap.height()));

@@ -49,6 +49,24 @@ pub fn plastic(alpha: f32, ggx: bool) -> Surface {
     }
 }
 
+/// A principled surface: a coloured body with sheen, a clear coat, tinted reflection, some metal and clear material.
+pub fn principled(roughness: f32, metallic: f32, spec_trans: f32) -> Surface {
+    Surface {
+        flags: BSDF_PRINCIPLED << SURFACE_KIND_SHIFT
+            | if spec_trans > 0.0 { SURFACE_ORIENTED } else { SURFACE_TWO_SIDED },
+        reflectance: Vec3::new(0.6, 0.4, 0.2),
+        specular: Vec3::splat(roughness),
+        transmittance: Vec3::new(metallic, spec_trans, 0.3),
+        extinction: Vec3::new(0.2, 0.5, 0.4),
+        internal_reflectance: 0.8,
+        specular_weight: 0.05,
+        eta: 1.5,
+        alpha: 1.0,
+        alpha_v: 1.0,
+        ..Surface::default()
+    }
+}
+
 /// The same surface with another roughness across the tangent.
 pub fn brushed(surface: Surface, alpha_v: f32) -> Surface {
     Surface { alpha_v, ..surface }
@@ -146,6 +164,16 @@ pub fn ask(surfaces: &[Surface], queries: &[Query]) -> Vec<Answer> {
     let table = bytemuck::cast_slice(surfaces);
     let outputs: Vec<[f32; 4]> =
         run("bsdf", &inputs, &[table, bytemuck::cast_slice(&values())], queries.len(), 6 * queries.len());
+    // Principled surfaces have a kernel of their own.
+    let mut outputs = outputs;
+    let kind = |query: &Query| surfaces[query.surface].flags >> SURFACE_KIND_SHIFT;
+    if queries.iter().any(|query| kind(query) == BSDF_PRINCIPLED) {
+        let found: Vec<[f32; 4]> =
+            run("principled", &inputs, &[table, bytemuck::cast_slice(&values())], queries.len(), 3 * queries.len());
+        for (k, _) in queries.iter().enumerate().filter(|(_, query)| kind(query) == BSDF_PRINCIPLED) {
+            outputs[6 * k..6 * k + 3].copy_from_slice(&found[3 * k..3 * k + 3]);
+        }
+    }
     let three = |vector: [f32; 4]| [vector[0], vector[1], vector[2]];
     let answer = |output: &[[f32; 4]]| Answer {
         direction: three(output[0]),

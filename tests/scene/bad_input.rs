@@ -289,7 +289,7 @@ fn materials_and_media() {
             "‸<medium type=\"homogeneous\"><float name=\"sigma_t\" value=\"1e300\"/><float name=\"scale\" value=\"1e300\"/></medium>",
             &["overflows"],
         ),
-        ("‸<bsdf type=\"principled\" id=\"b\"/>", &["accepted types: diffuse, null, twosided, dielectric"]),
+        ("‸<bsdf type=\"principledthin\" id=\"b\"/>", &["accepted types: diffuse, null, twosided, dielectric"]),
         ("‸<bsdf type=\"roughdielectrik\" id=\"b\"/>", &["did you mean \"roughdielectric\"?"]),
         ("<bsdf type=\"twosided\">‸<bsdf type=\"null\"/></bsdf>", &["cannot hold <bsdf type=\"null\">"]),
         ("‸<bsdf type=\"twosided\"/>", &["holds 0 BSDFs"]),

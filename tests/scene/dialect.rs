@@ -3,6 +3,8 @@
 use glam::{DMat3, DVec2, DVec3};
 use tyndall::pack::Packed;
 use tyndall::pack::layout::{SURFACE_MASK, SURFACE_PANE};
+use tyndall::reference::bindings::Tables;
+use tyndall::reference::texture::eval_attribute;
 use tyndall::scene::mesh::{attributes, ply};
 use tyndall::scene::mitsuba::parse_str;
 use tyndall::scene::*;
@@ -134,16 +136,18 @@ fn attributes_are_textures() {
         format!(r#"<texture type="mesh_attribute" name="{tag}"><string name="name" value="{name}"/></texture>"#)
     };
     let diffuse = |name: &str| format!(r#"<bsdf type="diffuse">{}</bsdf>"#, attribute("reflectance", name));
-    let at = |name: &str, triangle: usize, weights: DVec3| {
-        let shape = read(&diffuse(name)).unwrap().scene.shapes.remove(0);
-        let (Geometry::Mesh(mesh), Bsdf::Diffuse { reflectance, .. }) = (&shape.geometry, &shape.bsdf) else {
-            panic!()
-        };
-        let [a, b, c] = mesh.triangles[triangle].map(|corner| mesh.uvs[corner as usize]);
-        let place: DVec2 = a * weights.x + b * weights.y + c * weights.z;
-        // Three corners of each of the two triangles that have an area.
-        assert_eq!((mesh.triangles.len(), mesh.positions.len()), (2, 6));
-        reflectance.eval(place)
+    let at = |name: &str, triangle: u32, weights: DVec3| {
+        let scene = read(&diffuse(name)).unwrap().scene;
+        let Geometry::Mesh(mesh) = &scene.shapes[0].geometry else { panic!() };
+        // Two of the triangles have an area, and share corners.
+        assert_eq!((mesh.triangles.len(), mesh.positions.len()), (2, 4));
+        let packed = Packed::new(&scene, 1).unwrap();
+        assert!(packed.features.attributes);
+        let tables = Tables::new(&packed);
+        let mut numbers: Vec<u32> = tables.corners.iter().map(|corners| corners.number).collect();
+        numbers.sort_unstable();
+        assert_eq!(numbers, [0, 1]);
+        eval_attribute(&tables.textures[0], &tables.values, triangle, DVec2::new(weights.y, weights.z))
     };
     let weights = DVec3::new(0.5, 0.3, 0.2);
     let close = |a: DVec3, b: DVec3| assert!((a - b).length() < 1e-6, "{a} is not {b}");
@@ -163,7 +167,11 @@ fn attributes_are_textures() {
         r#"<bsdf type="mask">{}<bsdf type="diffuse"><texture type="checkerboard" name="reflectance"/></bsdf></bsdf>"#,
         attribute("opacity", "vertex_heat")
     );
-    assert!(error(&mixed).contains("only one of them"), "{}", error(&mixed));
+    // Another texture beside it needs coordinates, which this mesh does not have.
+    assert!(error(&mixed).contains("has a texture, but its mesh has no texture coordinates"), "{}", error(&mixed));
+    let map =
+        format!(r#"<bsdf type="normalmap">{}<bsdf type="diffuse"/></bsdf>"#, attribute("normalmap", "vertex_color"));
+    assert!(error(&map).contains("cannot be a \"mesh_attribute\""), "{}", error(&map));
     let on_a_cube = parse(&format!(
         "<scene version=\"3.0.0\">{SENSOR}{LIGHT}<shape type=\"cube\">{}</shape></scene>",
         diffuse("vertex_color")
@@ -213,15 +221,16 @@ fn a_turned_sphere_has_axes() {
 }
 
 #[test]
-fn panes_without_colour_are_passed() {
+fn panes_are_passed() {
     let flags = |factor: &str| {
         let body = format!(r#"<shape type="sphere"><bsdf type="thindielectric">{factor}</bsdf></shape>"#);
         let packed = Packed::new(&scene(&body), 1).unwrap();
-        (packed.surfaces[0].flags & (SURFACE_PANE | SURFACE_MASK) != 0, packed.surfaces[0].opacity)
+        assert!(packed.surfaces[0].flags & SURFACE_PANE != 0 && packed.surfaces[0].flags & SURFACE_MASK != 0);
+        (packed.features.tints, packed.surfaces[0].opacity)
     };
-    assert_eq!(flags(""), (true, 1.0));
-    assert_eq!(flags(r#"<float name="specular_transmittance" value="0.5"/>"#), (true, 0.5));
-    assert!(!flags(r#"<rgb name="specular_transmittance" value="0.5, 0.6, 0.5"/>"#).0);
+    assert_eq!(flags(""), (false, 1.0));
+    assert_eq!(flags(r#"<float name="specular_transmittance" value="0.5"/>"#), (false, 0.5));
+    assert_eq!(flags(r#"<rgb name="specular_transmittance" value="0.5, 0.6, 0.5"/>"#), (true, 0.6));
 }
 
 #[test]

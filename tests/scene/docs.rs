@@ -108,6 +108,7 @@ fn every_property_is_documented() {
         ("### `<bsdf type=\"roughconductor\">`", r#"<bsdf type="roughconductor">‸</bsdf>"#, &[]),
         ("### `<bsdf type=\"plastic\">`", r#"<bsdf type="plastic">‸</bsdf>"#, &[]),
         ("### `<bsdf type=\"roughplastic\">`", r#"<bsdf type="roughplastic">‸</bsdf>"#, &[]),
+        ("### `<bsdf type=\"principled\">`", r#"<bsdf type="principled">‸</bsdf>"#, &[]),
         ("### `<bsdf type=\"mask\">`", r#"<bsdf type="mask"><bsdf type="null"/>‸</bsdf>"#, &[]),
         (
             "### `<bsdf type=\"blendbsdf\">`",

@@ -121,6 +121,20 @@ fn integrators_around_others() {
     assert_eq!(integrator(&format!(r#"<integrator type="moment">{inner}</integrator>"#)).max_depth, Some(5));
     let aov = format!(r#"<integrator type="aov"><string name="aovs" value="d:depth"/>{inner}</integrator>"#);
     assert_eq!(scene(&aov).aovs, [Aov { name: "d".to_owned(), kind: AovKind::Depth }]);
+    // Channels of second moments have Mitsuba's names.
+    let named = |name: &str| aov.replace("<integrator type=\"path\"", &format!("<integrator {name}type=\"path\""));
+    for (body, moments) in [
+        (aov.clone(), None),
+        (format!(r#"<integrator type="moment">{inner}</integrator>"#), Some("_arg_0")),
+        (
+            format!(r#"<integrator type="moment">{}</integrator>"#, inner.replace("type=", "name=\"a\" type=")),
+            Some("a"),
+        ),
+        (format!(r#"<integrator type="moment">{aov}</integrator>"#), Some("_arg_0._arg_0")),
+        (format!(r#"<integrator type="moment">{}</integrator>"#, named("name=\"b\" ")), Some("_arg_0.b")),
+    ] {
+        assert_eq!(scene(&body).moments.as_deref(), moments, "{body}");
+    }
     let error = |body: &str| {
         let text = format!("<scene version=\"3.0.0\">{}{}{body}</scene>", crate::SENSOR, crate::LIGHT);
         crate::parse(&text).unwrap_err().to_string()
@@ -134,6 +148,12 @@ fn integrators_around_others() {
         let text = error(&format!(r#"<integrator type="moment" id="outer">{inside}</integrator>"#));
         assert!(text.contains(message), "{inside}: {text}");
     }
+    let clash = aov.replace("d:depth", "m2__arg_0._arg_0:albedo");
+    let text = error(&format!(r#"<integrator type="moment">{clash}</integrator>"#));
+    assert!(text.contains("aovs has the name \"m2__arg_0._arg_0\", which is that of the second moments"), "{text}");
+    let long = inner.replace("type=", &format!("name=\"{}\" type=", "a".repeat(201)));
+    let text = error(&format!(r#"<integrator type="moment">{long}</integrator>"#));
+    assert!(text.contains("longer than 200 bytes"), "{text}");
     for (aovs, message) in [
         ("d:dephth", "aovs has \"d:dephth\"; accepted: pairs name:type"),
         ("depth", "aovs has \"depth\""),

@@ -1,10 +1,9 @@
 //! Numbers that a mesh file gives to vertices or faces beside their places, as textures.
 //!
-//! The numbers of all triangles are laid out in one image, a block of 2 × 2 pixels for each: those of the corners a, b and c, and
-//! b + c − a. Bilinear interpolation between four such pixels is linear, a + s (b − a) + t (c − a), so that an ordinary look-up with
-//! texture coordinates at the centres of three of the pixels is just what is meant.
+//! The numbers of all triangles are laid out in one image, a block of 2 × 2 pixels for each, in rows of equally many: those of the corners a, b
+//! and c, and b + c − a. Bilinear interpolation between four such pixels is linear, a + s (b − a) + t (c − a).
 
-use glam::{DVec2, Vec3};
+use glam::Vec3;
 
 use crate::scene::{Bitmap, Mesh};
 
@@ -59,26 +58,6 @@ fn size(triangles: usize) -> (usize, usize) {
 fn place(triangle: usize, width: usize) -> (usize, usize) {
     let columns = width / 2;
     (2 * (triangle % columns), 2 * (triangle / columns))
-}
-
-/// Gives each triangle vertices of its own, whose texture coordinates are its place in the images of attributes.
-pub fn unfold(mesh: &mut Mesh) {
-    let (width, height) = size(mesh.triangles.len());
-    let corners: Vec<usize> = mesh.triangles.iter().flatten().map(|corner| *corner as usize).collect();
-    mesh.positions = corners.iter().map(|&corner| mesh.positions[corner]).collect();
-    if !mesh.normals.is_empty() {
-        mesh.normals = corners.iter().map(|&corner| mesh.normals[corner]).collect();
-    }
-    let scale = DVec2::new(1.0 / width as f64, 1.0 / height as f64);
-    let offsets = [DVec2::new(0.5, 0.5), DVec2::new(1.5, 0.5), DVec2::new(0.5, 1.5)];
-    mesh.uvs = (0..corners.len())
-        .map(|k| {
-            let (column, row) = place(k / 3, width);
-            (DVec2::new(column as f64, row as f64) + offsets[k % 3]) * scale
-        })
-        .collect();
-    let count = mesh.triangles.len() as u32;
-    mesh.triangles = (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
 }
 
 /// Which of the triangles `before` those that are `left` are; some may have been taken out, but their order is the same.

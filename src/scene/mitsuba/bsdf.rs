@@ -4,13 +4,14 @@ use glam::DVec3;
 
 use super::build::Context;
 use super::material::{self, AIR, BK7, POLYPROPYLENE};
+use super::principled;
 use super::props::{Child, Colored, Given, NumberOrName, Props, unknown_plugin};
 use super::suggest::{did_you_mean, list};
 use super::texture::{self, choice, fraction, gray, gray_fraction};
 use super::tree::Kind;
 use crate::scene::{Bsdf, Distribution, Filter, Relief, ReliefMap, Roughness, SceneError, Texture};
 
-pub(super) const TYPES: [&str; 14] = [
+pub(super) const TYPES: [&str; 15] = [
     "diffuse",
     "null",
     "twosided",
@@ -21,6 +22,7 @@ pub(super) const TYPES: [&str; 14] = [
     "roughconductor",
     "plastic",
     "roughplastic",
+    "principled",
     "mask",
     "blendbsdf",
     "normalmap",
@@ -28,8 +30,17 @@ pub(super) const TYPES: [&str; 14] = [
 ];
 
 /// What `twosided` can hold.
-const ONE_SIDED: [&str; 8] =
-    ["diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "blendbsdf", "normalmap", "bumpmap"];
+const ONE_SIDED: [&str; 9] = [
+    "diffuse",
+    "conductor",
+    "roughconductor",
+    "plastic",
+    "roughplastic",
+    "principled",
+    "blendbsdf",
+    "normalmap",
+    "bumpmap",
+];
 
 /// What Mitsuba gives to a shape without a BSDF, and the reflectance of a `diffuse` that does not say.
 pub(super) const DEFAULT_REFLECTANCE: f64 = 0.5;
@@ -117,6 +128,7 @@ fn plugin<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result<Bsdf, Scene
                 two_sided,
             }
         }
+        "principled" => Bsdf::Principled { parameters: principled::read(context, &props)?, two_sided: false },
         "mask" => {
             let opacity = gray_fraction(context, &props, "opacity", 0.5)?;
             let nested = only_child(child, &props)?;
@@ -199,6 +211,10 @@ fn relief<'a>(
     props: &Props<'a>,
     map: ReliefMap,
 ) -> Result<Bsdf, SceneError> {
+    if let ReliefMap::Normals(Texture::Attribute { .. }) | ReliefMap::Heights(Texture::Attribute { .. }, _) = map {
+        let what = child.object.describe();
+        return Err(child.object.at.error(format!("the map of {what} cannot be a \"mesh_attribute\"; use \"bitmap\"")));
+    }
     let flips = props.boolean("flip_invalid_normals")?.is_none_or(|given| given.value);
     let fades = props.boolean("use_shadowing_function")?.is_none_or(|given| given.value);
     let inner = only_child(child, props)?;

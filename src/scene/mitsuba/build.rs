@@ -20,6 +20,8 @@ pub(super) struct Context<'a> {
     pub media: Vec<Medium>,
     /// Channels beside the radiance.
     pub aovs: Vec<Aov>,
+    /// Name of the channels with second moments.
+    pub moments: Option<String>,
     /// Images by file, and whether they are raw.
     pub images: HashMap<(PathBuf, bool), Arc<Bitmap>>,
     /// Voxels by file and name of the grid in it.
@@ -63,6 +65,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
         warnings: Vec::new(),
         media: Vec::new(),
         aovs: Vec::new(),
+        moments: None,
         images,
         grids,
         meshes,
@@ -120,6 +123,12 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
     if !has_light(&shapes, &lights, &context.media) {
         context.warnings.push(root.at.warning("the scene has no light: the picture will be black"));
     }
+    let mut moments = context.moments;
+    if let (Some(_), Some(child), true) = (&moments, integrator_child, sensor.film.filter.has_negative_lobes()) {
+        let text = "no second moments are written: with a filter of both signs the squares of samples say nothing; use \"box\", \"tent\" or \"gaussian\"";
+        context.warnings.push(child.at.warning(text));
+        moments = None;
+    }
     let scene = Scene {
         camera: sensor.camera,
         film: sensor.film,
@@ -128,6 +137,7 @@ pub(super) fn build(tree: &Tree) -> Result<Loaded, SceneError> {
         media: context.media,
         lights,
         aovs: context.aovs,
+        moments,
         sample_count: sensor.sample_count,
     };
     context.warnings.extend(tree.warnings());

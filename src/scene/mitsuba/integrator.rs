@@ -96,8 +96,31 @@ fn wrapped<'a>(context: &mut Context<'a>, child: Child<'a>, props: Props<'a>) ->
         let (what, found) = (child.object.describe(), inner.object.describe());
         return Err(inner.at.error(format!("{what} cannot hold {found}; it must hold one that renders")));
     }
+    name_moments(context, child, inner)?;
     convert(context, inner)
 }
+
+/// Names the channels of second moments as Mitsuba does, by the integrators inside of `moment`, with dots between them.
+fn name_moments(context: &mut Context, child: Child, inner: Child) -> Result<(), SceneError> {
+    // Mitsuba's name of what has none.
+    let name = inner.name.unwrap_or("_arg_0");
+    let name = match &context.moments {
+        Some(outer) => format!("{outer}.{name}"),
+        None if child.object.plugin == "moment" => name.to_owned(),
+        None => return Ok(()),
+    };
+    if name.len() > LONGEST_NAME {
+        return Err(inner.at.error(format!("the name of the integrator is longer than {LONGEST_NAME} bytes")));
+    }
+    if context.aovs.iter().any(|aov| aov.name == format!("m2_{name}")) {
+        return Err(child.at.error(format!("aovs has the name \"m2_{name}\", which is that of the second moments")));
+    }
+    context.moments = Some(name);
+    Ok(())
+}
+
+/// Bytes of a name of channels that an OpenEXR file can hold with what is added to it.
+const LONGEST_NAME: usize = 200;
 
 /// One `name:type` of `aovs`.
 fn aov(token: &str, given: &Given<String>) -> Result<Aov, SceneError> {

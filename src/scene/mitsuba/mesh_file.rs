@@ -32,8 +32,6 @@ pub(super) enum Attributes {
         faces: Vec<u32>,
         /// The images that were made, by name and the bits of their factor.
         images: HashMap<(String, u32), Arc<Bitmap>>,
-        /// How often a texture was one of them.
-        uses: usize,
     },
 }
 
@@ -42,7 +40,7 @@ impl Attributes {
     fn of(mesh: &Mesh, file: Arc<FileMesh>, faces: Vec<u32>) -> Attributes {
         // The mesh is only needed for images.
         let mesh = if file.attributes.is_empty() { Mesh::default() } else { mesh.clone() };
-        Attributes::Known { mesh, file, faces, images: HashMap::new(), uses: 0 }
+        Attributes::Known { mesh, file, faces, images: HashMap::new() }
     }
 
     /// Of a shape that is not from a file.
@@ -53,7 +51,7 @@ impl Attributes {
 
     /// The image of an attribute; `None` where there is no shape to have it. The error lists the attributes that there are.
     pub(super) fn image(&mut self, name: &str, scale: f64) -> Result<Option<Arc<Bitmap>>, String> {
-        let Attributes::Known { mesh, file, faces, images, uses } = self else { return Ok(None) };
+        let Attributes::Known { mesh, file, faces, images } = self else { return Ok(None) };
         let usable = || file.attributes.iter().filter(|attribute| matches!(attribute.channels, 1 | 3));
         let Some(attribute) = usable().find(|attribute| attribute.name == name) else {
             let names: Vec<&str> = usable().map(|attribute| attribute.name.as_str()).collect();
@@ -62,15 +60,13 @@ impl Attributes {
         };
         let scale = scale as f32;
         let image = images.entry((name.to_owned(), scale.to_bits()));
-        *uses += 1;
         Ok(Some(image.or_insert_with(|| Arc::new(attribute.image(mesh, faces, scale))).clone()))
     }
 
-    /// How many textures are attributes.
-    pub(super) fn uses(&self) -> usize {
-        match self {
-            Attributes::Unknown => 0,
-            Attributes::Known { uses, .. } => *uses,
+    /// Follows the mesh, whose triangles are turned over.
+    pub(super) fn flip(&mut self) {
+        if let Attributes::Known { mesh, .. } = self {
+            mesh.flip();
         }
     }
 }

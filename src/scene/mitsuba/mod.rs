@@ -19,6 +19,7 @@ mod medium;
 mod mesh_file;
 mod params;
 mod plugins;
+mod principled;
 mod props;
 mod sensor;
 mod shape;

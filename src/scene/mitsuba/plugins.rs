@@ -22,7 +22,7 @@ pub(super) const SUPPORTED: [(Kind, &[&str]); 13] = [
 
 /// Plugins of Mitsuba 3.9 that are not supported, and what to use instead. An entry of a plugin that is supported has no
 /// effect.
-pub(super) const REFUSED: [(Kind, &str, &str); 32] = [
+pub(super) const REFUSED: [(Kind, &str, &str); 31] = [
     (Kind::Integrator, "depth", "use \"volpath\": only radiance is rendered"),
     (Kind::Integrator, "stokes", "use \"volpath\": light is not polarised here"),
     (Kind::Integrator, "prb", "use \"path\": nothing is differentiated here"),
@@ -39,12 +39,7 @@ pub(super) const REFUSED: [(Kind, &str, &str); 32] = [
     (Kind::Shape, "ellipsoidsmesh", "use a mesh file (obj or ply)"),
     (Kind::Shape, "sdfgrid", "convert it to a mesh file (obj or ply)"),
     (Kind::Shape, "merge", "put its shapes directly into the scene"),
-    (
-        Kind::Bsdf,
-        "principled",
-        "use \"roughplastic\" for what is painted, \"roughconductor\" for metal, \"roughdielectric\" for glass",
-    ),
-    (Kind::Bsdf, "principledthin", "use \"thindielectric\" or \"diffuse\""),
+    (Kind::Bsdf, "principledthin", "use \"principled\", \"thindielectric\" or \"diffuse\""),
     (Kind::Bsdf, "pplastic", "use \"plastic\" or \"roughplastic\": light is not polarised here"),
     (Kind::Bsdf, "measured", "use \"roughconductor\" or \"roughplastic\""),
     (Kind::Bsdf, "measured_polarized", "use \"roughconductor\" or \"roughplastic\": light is not polarised here"),

@@ -8,7 +8,7 @@ use super::props::{Child, Props, unknown_plugin};
 use super::tree::Kind;
 use super::{bsdf, emitter, medium};
 use crate::scene::mesh;
-use crate::scene::{Boundary, Bsdf, Geometry, SceneError, Shape, Texture};
+use crate::scene::{Boundary, Bsdf, Geometry, SceneError, Shape};
 
 /// Shapes that have points.
 pub(super) const TYPES: [&str; 10] =
@@ -125,6 +125,7 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
         (outline.own_normals, outline.mirrored, &mut outline.geometry, boundary)
     {
         mesh.flip();
+        outline.attributes.flip();
         outline.mirrored = None;
     }
     context.attributes = std::mem::take(&mut outline.attributes);
@@ -132,7 +133,7 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
         Some(child) => bsdf::convert(context, child)?,
         None => default_bsdf(context, child, emission, boundary),
     };
-    unfold(child, &std::mem::take(&mut context.attributes), &bsdf, emission_texture.as_ref(), &mut outline)?;
+    context.attributes = Attributes::default();
     props.finish()?;
     if matches!(plugin, "disk" | "cylinder") {
         let text = format!(
@@ -166,30 +167,6 @@ fn single<'a>(context: &mut Context<'a>, child: Child<'a>, outer: &DMat4) -> Res
     }
     let name = child.object.id.clone().unwrap_or(outline.name);
     Ok(outline.geometry.map(|geometry| Shape { name, geometry, bsdf, emission, emission_texture, axes, boundary }))
-}
-
-/// Gives a mesh whose textures are attributes the texture coordinates of these.
-fn unfold(
-    child: Child,
-    attributes: &Attributes,
-    bsdf: &Bsdf,
-    lamp: Option<&Texture>,
-    outline: &mut Outline,
-) -> Result<(), SceneError> {
-    if attributes.uses() == 0 {
-        return Ok(());
-    }
-    let textures = bsdf.textures().into_iter().chain(lamp).filter(|texture| texture.constant().is_none()).count();
-    if textures > attributes.uses() || bsdf.needs_tangents() {
-        return Err(child.object.at.error(
-            "the BSDF of this shape has a \"mesh_attribute\" beside something that needs texture coordinates; only one of them is \
-             accepted",
-        ));
-    }
-    if let Some(Geometry::Mesh(mesh)) = &mut outline.geometry {
-        mesh::attributes::unfold(mesh);
-    }
-    Ok(())
 }
 
 /// What Mitsuba gives to a shape without a BSDF.

@@ -33,10 +33,10 @@ pub(super) fn fraction<'a>(
                     refuse_outside(name, *color0, child.at)?;
                     refuse_outside(name, *color1, child.at)?;
                 }
-                Texture::Bitmap { bitmap, .. } => {
+                Texture::Bitmap { bitmap, .. } | Texture::Attribute { bitmap } => {
                     let outside = |pixel: &[f32; 3]| pixel.iter().any(|value| !(0.0..=1.0).contains(value));
                     // Of the four pixels of an attribute's triangle the last one is no value of it.
-                    let attribute = child.object.plugin == "mesh_attribute";
+                    let attribute = !texture.needs_uvs();
                     let counts = |index: usize| {
                         let (x, y) = (index % bitmap.width() as usize, index / bitmap.width() as usize);
                         !attribute || x % 2 == 0 || y % 2 == 0
@@ -87,11 +87,15 @@ pub(super) fn gray(texture: Texture) -> Texture {
             Texture::Checkerboard { color0: mean(color0), color1: mean(color1), to_uv }
         }
         Texture::Bitmap { bitmap, filter, wrap, to_uv } => {
-            let gray = bitmap.pixels().iter().all(|[r, g, b]| r == g && g == b);
-            let bitmap = if gray { bitmap } else { Arc::new(bitmap.map(|pixel| [bitmap::luminance(pixel); 3])) };
-            Texture::Bitmap { bitmap, filter, wrap, to_uv }
+            Texture::Bitmap { bitmap: gray_image(bitmap), filter, wrap, to_uv }
         }
+        Texture::Attribute { bitmap } => Texture::Attribute { bitmap: gray_image(bitmap) },
     }
+}
+
+fn gray_image(bitmap: Arc<Bitmap>) -> Arc<Bitmap> {
+    let gray = bitmap.pixels().iter().all(|[r, g, b]| r == g && g == b);
+    if gray { bitmap } else { Arc::new(bitmap.map(|pixel| [bitmap::luminance(pixel); 3])) }
 }
 
 /// A texture.
@@ -134,9 +138,7 @@ pub(super) fn convert<'a>(context: &mut Context<'a>, child: Child<'a>) -> Result
             let image = context.attributes.image(&name.value, scale).map_err(|message| name.at.error(message))?;
             Ok(match image {
                 None => Texture::Constant(DVec3::splat(0.5)),
-                Some(bitmap) => {
-                    Texture::Bitmap { bitmap, filter: Filter::Bilinear, wrap: Wrap::Clamp, to_uv: DAffine2::IDENTITY }
-                }
+                Some(bitmap) => Texture::Attribute { bitmap },
             })
         }
         _ => Err(unknown_plugin(child.object, &TYPES)),
