@@ -17,7 +17,6 @@
 //! The pilot has seeds of its own and depends on the scene alone, so the samples of a render can be split and merged as ever.
 
 use crate::pack::Packed;
-use crate::pack::features::Features;
 use crate::pack::layout::PILOT_CELLS;
 use crate::pack::lights::is_near;
 use crate::reference::bindings::Tables;
@@ -145,12 +144,12 @@ fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
     }
 }
 
-/// Whether the kernels can connect paths of different pixels in such a scene, and do it well: light through voxels and masks is known by
-/// chance only; and what goes by small lamps in fog must do so at all its vertices.
+/// Whether the kernels can connect paths of different pixels in such a scene, and do it well: light through voxels, masks and panes is known
+/// by chance only; and what goes by small lamps in fog must do so at all its vertices.
 pub fn can_share_paths(packed: &Packed) -> bool {
     let features = &packed.features;
     let spread = !features.equiangular || has_broad_lamps_only(packed);
-    features.light_sampling && spread && !features.grids && !features.masks
+    features.light_sampling && spread && !features.grids && !features.masks && !features.panes
 }
 
 /// Whether all lamps are so broad that light does not come from near them alone.

@@ -92,6 +92,11 @@ impl Seen {
         Some(Seen { tables, pixels })
     }
 
+    /// The pixels whose lamps are found apart: their numbers in the crop window, row by row.
+    pub fn pixels(&self) -> impl Iterator<Item = usize> {
+        self.pixels.iter().map(|pixel| pixel.index as usize)
+    }
+
     /// Adds to blocks what the paths have left out.
     fn add(&self, blocks: &mut [Block]) {
         for block in blocks {
@@ -116,12 +121,17 @@ impl Seen {
     }
 }
 
-/// A device, and rays that bring what its paths leave out.
-pub struct WithSeen<B> {
-    /// Renders the rest.
-    pub device: B,
-    /// Brings the lamps.
-    pub seen: Seen,
+/// A device, with rays that bring what its paths leave out, if they do.
+pub fn with_seen(device: impl Backend + 'static, seen: Option<Seen>) -> Box<dyn Backend> {
+    match seen {
+        Some(seen) => Box::new(WithSeen { device, seen }),
+        None => Box::new(device),
+    }
+}
+
+struct WithSeen<B> {
+    device: B,
+    seen: Seen,
 }
 
 impl<B: Backend> Backend for WithSeen<B> {

@@ -15,6 +15,7 @@ use tyndall::pilot;
 use tyndall::render::session::{self, Options};
 use tyndall::render::{Backend, picture};
 use tyndall::scene::{Crop, Scene};
+use tyndall::seen::{Seen, with_seen};
 
 use super::arguments::Arguments;
 use super::case::{Case, load_scene};
@@ -33,6 +34,10 @@ pub enum Lever {
     NoPilot,
     /// With paths of its own for each pixel.
     NoSharing,
+    /// With the plain mean of what pixels share.
+    NoReconstruction,
+    /// With all lamps that the camera sees left to paths.
+    NoSeen,
     /// With all primitives in the tree.
     NoImmediates,
     /// Without equiangular distances and directions past lamps.
@@ -43,8 +48,16 @@ pub enum Lever {
 
 impl Lever {
     /// All of them, the whole program first.
-    pub const LEVERS: [Lever; 6] =
-        [Lever::All, Lever::NoPilot, Lever::NoSharing, Lever::NoImmediates, Lever::NoEquiangular, Lever::NoSeals];
+    pub const LEVERS: [Lever; 8] = [
+        Lever::All,
+        Lever::NoPilot,
+        Lever::NoSharing,
+        Lever::NoReconstruction,
+        Lever::NoSeen,
+        Lever::NoImmediates,
+        Lever::NoEquiangular,
+        Lever::NoSeals,
+    ];
 
     /// Its name in the results.
     pub fn name(self) -> &'static str {
@@ -52,6 +65,8 @@ impl Lever {
             Lever::All => "default",
             Lever::NoPilot => "no pilot",
             Lever::NoSharing => "no sharing",
+            Lever::NoReconstruction => "no reconstruction",
+            Lever::NoSeen => "lamps left to paths",
             Lever::NoImmediates => "all in the tree",
             Lever::NoEquiangular => "no equiangular",
             Lever::NoSeals => "no seals",
@@ -62,7 +77,8 @@ impl Lever {
     fn pull(self, packed: Packed) -> Option<Packed> {
         let useful = match self {
             Lever::All | Lever::NoPilot => true,
-            Lever::NoSharing => pilot::can_share_paths(&packed.features) || packed.features.equiangular,
+            Lever::NoSharing | Lever::NoReconstruction => pilot::can_share_paths(&packed),
+            Lever::NoSeen => packed.primitives.iter().any(|primitive| primitive.light != 0),
             Lever::NoImmediates => packed.immediate_count > 0,
             Lever::NoEquiangular => packed.features.equiangular,
             Lever::NoSeals => packed.features.sealed,
@@ -72,7 +88,6 @@ impl Lever {
             _ => packed,
         };
         match self {
-            Lever::All | Lever::NoPilot | Lever::NoSharing | Lever::NoImmediates => {}
             Lever::NoEquiangular => {
                 packed.media.iter_mut().for_each(|medium| medium.equiangular = 0.0);
                 packed.features.equiangular = false;
@@ -81,6 +96,7 @@ impl Lever {
                 packed.media.iter_mut().for_each(|medium| medium.grids &= !MEDIUM_SEALED);
                 packed.features.sealed = false;
             }
+            _ => {}
         }
         useful.then_some(packed)
     }
@@ -129,13 +145,16 @@ impl OurDevice {
         let packed = Packed::new(scene, seed).map_err(|cause| error(cause.to_string()))?;
         let Some(mut packed) = lever.pull(packed) else { return Ok(None) };
         let (begin, begin_cpu) = (Instant::now(), cpu_time());
+        let mut seen = None;
         if lever != Lever::NoPilot {
             pilot::run(&mut packed, lever != Lever::NoSharing);
+            seen = if lever == Lever::NoSeen { None } else { Seen::find(&mut packed) };
         }
         let pilot = Time { wall: begin.elapsed().as_secs_f64(), cpu: cpu_time() - begin_cpu };
-        let mut backend = Renderer::new(&self.device, &packed).map_err(|cause| error(cause.to_string()))?;
+        let renderer = Renderer::new(&self.device, &packed).map_err(|cause| error(cause.to_string()))?;
+        let mut backend = with_seen(renderer, seen);
         backend.render(0..1).map_err(|cause| error(cause.to_string()))?;
-        Ok(Some(Ready { name, scene, seed, backend, pilot }))
+        Ok(Some(Ready { name, scene, seed, lever, backend, pilot }))
     }
 
     /// One picture for each budget.
@@ -196,7 +215,8 @@ pub struct Ready<'a> {
     name: &'a str,
     scene: &'a Scene,
     seed: u32,
-    backend: Renderer,
+    lever: Lever,
+    backend: Box<dyn Backend>,
     /// What the pilot run took.
     pilot: Time,
 }
@@ -214,15 +234,18 @@ impl Ready<'_> {
         let crop = self.scene.film.crop;
         let pixels = crop.width as usize * crop.height as usize;
         let (begin, begin_cpu) = (Instant::now(), cpu_time());
-        let rendered = session::render(&mut self.backend, pixels, &options, &AtomicBool::new(false), &mut |_| {})
+        let mut rendered = session::render(&mut *self.backend, pixels, &options, &AtomicBool::new(false), &mut |_| {})
             .map_err(|cause| error(cause.to_string()))?;
+        if self.lever == Lever::NoReconstruction {
+            rendered.film.forget_shared();
+        }
+        let image = picture::assemble(self.scene, &rendered, self.backend.device(), self.seed);
         let (wall, cpu) = (begin.elapsed().as_secs_f64(), cpu_time() - begin_cpu);
         let time = Time { wall: wall + self.pilot.wall, cpu: cpu + self.pilot.cpu };
         let invalid: u64 = rendered.film.invalid().iter().sum();
         if invalid > 0 {
             return Err(error(format!("{invalid} samples are not finite")));
         }
-        let image = picture::assemble(self.scene, &rendered, self.backend.device(), self.seed);
         Ok((image, rendered.film.samples(), time))
     }
 }

@@ -9,7 +9,7 @@ use tyndall::reference;
 use tyndall::render::{Backend, BackendError};
 use tyndall::scene::Scene;
 use tyndall::scene::mitsuba::{self, Loaded};
-use tyndall::seen::{Seen, WithSeen};
+use tyndall::seen::{Seen, with_seen};
 
 use super::error::CliError;
 
@@ -33,7 +33,8 @@ pub fn open(
     let mut seen = None;
     if with_pilot {
         pilot::run(&mut packed, sharing);
-        seen = Seen::find(&mut packed);
+        // Second moments are those of paths.
+        seen = if scene.moments.is_none() { Seen::find(&mut packed) } else { None };
     }
     packed.warnings.iter().for_each(|warning| warn(warning));
     if choice == "reference" {
@@ -46,13 +47,6 @@ pub fn open(
     };
     let device = Device::open(&choice).map_err(device_error)?;
     Ok(with_seen(gpu::Renderer::new(&device, &packed).map_err(device_error)?, seen))
-}
-
-fn with_seen(device: impl Backend + 'static, seen: Option<Seen>) -> Box<dyn Backend> {
-    match seen {
-        Some(seen) => Box::new(WithSeen { device, seen }),
-        None => Box::new(device),
-    }
 }
 
 /// The tables of a scene, as [`open`] would upload them.

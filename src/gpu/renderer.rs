@@ -119,9 +119,10 @@ impl Renderer {
         let capacity = capacity(pixels, sharers as usize, u64::MAX);
         let of_samples = capacity * vectors_of_sample(sharers as usize);
         let quads = of_samples + sums_length(pixels, capacity, sharers as usize) + capacity / TILE_PIXELS;
-        // A block has a sum and a sum of squares for each channel of a pixel.
+        // A block has a sum and a sum of squares for each channel of a pixel, and what was shared in each run.
+        let sums_of_block = if sharers == 0 { 2 } else { 2 + u64::from(BLOCK_SAMPLES / RUN_SAMPLES) };
         let blocks = (capacity / pixels / BLOCK_SAMPLES as usize).max(1);
-        let block = u64::from(crop[0]) * u64::from(crop[1]) * size_of::<[[f32; 3]; 2]>() as u64;
+        let block = u64::from(crop[0]) * u64::from(crop[1]) * size_of::<[f32; 3]>() as u64 * sums_of_block;
         ((quads * size_of::<[f32; 4]>()) as u64, blocks as u64 * block)
     }
 

@@ -9,7 +9,9 @@ use super::grid::{
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
 use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight, survival_weight};
 use super::path_aim::{PIVOT_SET, light_pivot};
-use super::path_state::{FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, choose_light, goes_by_lamps, medium_at, sample_set};
+use super::path_state::{
+    FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, choose_light, goes_by_lamps, medium_at, sample_set,
+};
 use super::ray::{offset_distance, vertex_clearance};
 use super::sampler::set_key;
 use crate::pack::layout::{MEDIUM_ALBEDO_GRID, MEDIUM_EMISSION_GRID, MEDIUM_HEIGHT, MEDIUM_VOXELS, PRIMITIVE_SPHERE};

@@ -101,6 +101,11 @@ impl Film {
         }
     }
 
+    /// Forgets what was shared: the image is then the mean.
+    pub fn forget_shared(&mut self) {
+        self.shared = None;
+    }
+
     /// What the pixels have shared so far, if they share paths.
     pub fn shared(&self) -> Option<&SharedSums> {
         self.shared.as_ref()

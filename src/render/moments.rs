@@ -31,6 +31,7 @@ mod tests {
             let sum = samples.iter().sum::<f32>();
             let squares = samples.iter().map(|sample| sample * sample).sum::<f32>();
             film.add(&Block {
+                shared: None,
                 first: 16 * index as u32,
                 count: samples.len() as u32,
                 sums: vec![[sum, 2.0 * sum, -sum]],

@@ -6,7 +6,8 @@ use tyndall::gpu;
 use tyndall::gpu::shader::Variant;
 use tyndall::pack::Packed;
 use tyndall::reference;
-use tyndall::render::{Backend, Block};
+use tyndall::render::film::Film;
+use tyndall::render::{Backend, Block, reconstruct};
 
 /// Mean radiance of each pixel.
 pub type Image = Vec<DVec3>;
@@ -28,6 +29,18 @@ pub fn mean(blocks: &[Block]) -> Image {
 pub fn on_device(packed: &Packed, spp: u32) -> Image {
     let mut renderer = gpu::Renderer::new(device(), packed).expect("the kernels compile");
     mean(&renderer.render(0..spp).expect("it renders"))
+}
+
+/// As the program renders it, with what pixels share put together as a whole.
+pub fn reconstructed(packed: &Packed, width: u32, spp: u32) -> Image {
+    let mut renderer = gpu::Renderer::new(device(), packed).expect("the kernels compile");
+    let mut film = Film::new(packed.pixel_count(), 0);
+    for block in renderer.render(0..spp).expect("it renders") {
+        assert_eq!(block.invalid, [0; 3], "samples of block {} are invalid", block.first);
+        film.add(&block);
+    }
+    assert!(film.shared().is_some(), "the pixels share paths");
+    reconstruct::image(&film, width).into_iter().map(DVec3::from).collect()
 }
 
 /// With a kernel in another form.
