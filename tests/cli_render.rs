@@ -327,7 +327,7 @@ fn pixels_with_second_moments_share_no_paths() {
     let small = ["--resolution", "64x64", "--spp", "2"];
     let (image, _) = render_file(&scene, &output, &small);
     let original = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/high-scattering.xml");
-    let (alone, _) = render_file(&original, &output, &[&small[..], &["--no-sharing"]].concat());
+    let (alone, _) = render_file(&original, &output, &[&small[..], &["--no-pilot"]].concat());
     assert_eq!(pixel_bits(&image), pixel_bits(&alone));
     let (shared, _) = render_file(&original, &output, &small);
     assert_ne!(pixel_bits(&image), pixel_bits(&shared), "the scene is one that would share them");

@@ -193,21 +193,35 @@ bool passes_mask(inout Path path, Surface surface, Primitive primitive, Hit hit)
     return u >= opacity;
 }
 
-// Goes on behind a coloured pane. Its colour is an optical depth of the flight, so that whatever weighs a flight knows of it; but no flight
-// ends there. Instead the channel is chosen anew by what is left of each, and the throughput loses what all of them lose together.
-void cross_pane(inout Path path, vec3 depth) {
+// Goes on behind a coloured pane, or a stretch of a medium that only absorbs. What it takes is an optical depth of the flight, so that
+// whatever weighs a flight knows of it; but no flight ends there. Instead the channel is chosen anew by what is left of each, and the
+// throughput loses what all of them lose together.
+void pass_absorbing(inout Path path, vec3 depth) {
     if (max_component(depth) == 0.0) {
+        return;
+    }
+    if (!HAS_CHROMATIC) {
+        float left = exp_minus(depth.x);
+        path.tau += depth.x;
+        path.throughput *= left;
+        path.absorbed *= left;
         return;
     }
     vec3 weights = channel_weights(path.throughput);
     float before = dot(weights, exp_minus(path.tau_rgb));
     path.tau_rgb += depth;
-    path.tau_mean += depth;
+    if (HAS_GRIDS) {
+        path.tau_mean += depth;
+    }
     vec3 left = weights * exp_minus(path.tau_rgb);
     float sum = sum_components(left);
-    path.throughput *= sum / before;
-    path.alive = sum > 0.0;
-    path.channel = sample_channel(left / sum, sample_set(path, MASK_SETS + path.crossings).w);
+    float passes = before > 0.0 ? sum / before : 0.0;
+    path.throughput *= passes;
+    path.absorbed *= passes;
+    if (sum > 0.0) {
+        path.channel = sample_channel(left / sum, sample_set(path, MASK_SETS + path.crossings).w);
+        path.crossings += 1u;
+    }
 }
 
 // Puts the one of the BSDFs of a surface in its place that acts at this vertex: by the side, or by chance. A choice has the share of the
@@ -270,18 +284,29 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         path.normal = path.direction;
         path.left = NONE;
         vertex.point = flight_point(path, primitive, side, end.way);
-        if (HAS_SHARING && !HAS_CHROMATIC) {
+        if (HAS_SHARING && HAS_CHROMATIC) {
+            path.absorbed *= rare_collision_weight(medium, end.way);
+        } else if (HAS_SHARING) {
             path.tau += medium.sigma_t.x * end.way;
+            path.absorbed *= rare_collision_weight(medium, end.way);
         }
         vertex.g = medium.g;
         vertex.phase = medium.phase;
         vertex.albedo = HAS_GRIDS ? end.weight * albedo_factor(medium, vertex.point) : end.weight;
         return true;
     }
-    if (HAS_MEDIA) {
+    if (HAS_ABSORBING && (medium.grids & MEDIUM_ABSORBS) != 0u) {
+        pass_absorbing(path, medium.sigma_t * (t - path.t_min));
+    } else if (HAS_MEDIA) {
         // The optical depth of the way through the medium since t_min.
         float way = HAS_GRIDS ? end.dense : t - path.t_min;
-        path.tau_left -= way * (HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
+        float sigma = HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x;
+        path.tau_left -= way * (HAS_ABSORBING ? medium.flight_share * sigma : sigma);
+        if (HAS_ABSORBING && medium.flight_share < 1.0) {
+            float left = rare_passage_weight(medium, way);
+            path.throughput *= left;
+            path.absorbed *= left;
+        }
         if (HAS_CHROMATIC) {
             path.tau_rgb += medium.sigma_t * way;
         } else {
@@ -307,7 +332,7 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
     }
     if ((HAS_BOUNDARIES || HAS_MASK) && crosses) {
         if (HAS_TINTS && (surface.flags & SURFACE_PANE) != 0u) {
-            cross_pane(path, pane_depth(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric));
+            pass_absorbing(path, pane_depth(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric));
         }
         path.anchor = point;
         cross_surface(path, surface, hit);

@@ -18,6 +18,16 @@ float free_way(Path path, Medium medium) {
     return free_flight(path.tau_left, HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
 }
 
+// The weight of a flight that goes on over that of one with the whole extinction coefficient, where flights take a part of it; and that of
+// one that ends.
+float rare_passage_weight(Medium medium, float way) {
+    return exp_minus((1.0 - medium.flight_share) * medium.sigma_t.x * way);
+}
+
+float rare_collision_weight(Medium medium, float way) {
+    return HAS_ABSORBING && medium.flight_share > 0.0 ? rare_passage_weight(medium, way) / medium.flight_share : 1.0;
+}
+
 // Where the flight ends on a ray that meets a surface at t_end, or nothing before t_end. A flight in a medium with equiangular
 // sampling is traced as far as it may get at all; whether it scatters on the way is decided by its free flight, and where, by
 // one of two techniques: the free flight itself, or with the probability `equiangular` distances that are likely near a light.
@@ -36,10 +46,11 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
     vec3 weights = HAS_CHROMATIC ? channel_weights(path.throughput) : vec3(0.0);
     if (!mixed) {
         // Not the difference of two distances, which are rounded.
-        end.way = free_flight(path.tau_left, sigma);
+        end.way = free_flight(path.tau_left, HAS_ABSORBING ? medium.flight_share * sigma : sigma);
         if (HAS_CHROMATIC) {
             end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * end.way, medium.sigma_t, medium.albedo);
         }
+        end.weight *= rare_collision_weight(medium, end.way);
         return end;
     }
     float scatters = one_minus_exp_minus(sigma * way);

@@ -128,7 +128,9 @@ void share_vertex(inout Path path, inout Vertex vertex) {
         store_sample(record + BASE, vec4(path.radiance, HAS_MEDIA && !HAS_CHROMATIC ? path.tau : 0.0));
         path.radiance = vec3(0.0);
         path.before = vertex.in_medium ? path.throughput * vertex.albedo : path.throughput;
-        path.throughput = vec3(1.0);
+        // The densities are those of flights that end in media that only absorb as well. A path that does not brings so much less instead.
+        path.throughput = vec3(HAS_ABSORBING || HAS_TINTS ? path.absorbed : 1.0);
+        path.before /= max(path.throughput, vec3(1e-30));
         vertex.albedo = vertex.in_medium ? MEDIUM(valid_medium(path.medium)).albedo : vertex.albedo;
         path.sharing = 2u;
     }

@@ -45,6 +45,7 @@ struct Path {
     vec3 tau_rgb;
     uint channel;
     float passed;           // where masks are: probability to pass those between the last event and t_min
+    float absorbed;         // where pixels share paths: what media that only absorb have left since the last event
     uint crossings;         // where masks are: how many the path has passed or met
     float far_end;          // where the far clip plane ends a camera ray
     // Where media are not homogeneous; a shadow ray has its own, and of `medium`, `tau_rgb` and `passed` as well.
@@ -154,12 +155,13 @@ float flight_end(Path path) {
         return path.far_end;
     }
     Medium medium = MEDIUM(valid_medium(path.medium));
-    if (HAS_GRIDS && (medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT)) != 0u) {
+    bool absorbs = HAS_ABSORBING && (medium.grids & MEDIUM_ABSORBS) != 0u;
+    if (absorbs || HAS_GRIDS && (medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT)) != 0u) {
         return path.far_end;
     }
     vec3 sigma_t = medium.sigma_t;
     float sigma = HAS_CHROMATIC ? channel_of(sigma_t, path.channel) : sigma_t.x;
-    float flight = free_flight(path.tau_left, sigma);
+    float flight = free_flight(path.tau_left, HAS_ABSORBING ? medium.flight_share * sigma : sigma);
     if (goes_by_lamps(path, medium)) {
         flight = free_flight(MAX_FLIGHT_TAU, medium.least_sigma_t);
     }
@@ -171,6 +173,7 @@ void begin_segment(inout Path path, vec2 u) {
     path.last = NONE;
     path.shadow = false;
     path.passed = 1.0;
+    path.absorbed = 1.0;
     if (HAS_MEDIA) {
         path.tau = 0.0;
         path.tau_left = minus_log_1m(u.x);

@@ -71,11 +71,11 @@ vec3 principled_fresnel(Surface surface, float f, float grazing) {
 
 // The diffuse body and the sheen on it, without the cosine of wo; m is half way between the two directions.
 vec3 principled_body(Surface surface, float opaque, vec3 wi, vec3 wo, vec3 m) {
-    float fi = schlick_weight(wi.z), fo = schlick_weight(wo.z), cos_d = dot(wo, m);
+    float f_in = schlick_weight(wi.z), f_out = schlick_weight(wo.z), cos_d = dot(wo, m);
     float retro = 2.0 * surface.specular.x * cos_d * cos_d;
-    float body = (1.0 - 0.5 * fi) * (1.0 - 0.5 * fo) + retro * (fo + fi + fo * fi * (retro - 1.0));
+    float body = (1.0 - 0.5 * f_in) * (1.0 - 0.5 * f_out) + retro * (f_out + f_in + f_out * f_in * (retro - 1.0));
     // As if light had gone some way below the surface, after Hanrahan and Krueger (1993).
-    float below = mix(1.0, 0.5 * retro, fo) * mix(1.0, 0.5 * retro, fi);
+    float below = mix(1.0, 0.5 * retro, f_out) * mix(1.0, 0.5 * retro, f_in);
     below = 1.25 * (below * (1.0 / (wo.z + wi.z) - 0.5) + 0.5);
     vec3 found = surface.reflectance * (opaque * INV_PI * mix(body, below, surface.transmittance.z));
     vec3 sheen = mix(vec3(1.0), principled_tint(surface.reflectance), surface.extinction.y);

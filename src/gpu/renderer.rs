@@ -182,10 +182,8 @@ impl Renderer {
                 let y = (tile / tiles_across * TILE as usize + pixel / TILE as usize).wrapping_sub(dy);
                 if x < width && y < height {
                     let pixel = y * width + x;
-                    for q in 0..3 {
-                        block.sums[pixel][q] += sums[0][q];
-                        block.squares[pixel][q] += sums[1][q];
-                    }
+                    add(&mut block.sums[pixel], sums[0]);
+                    add(&mut block.squares[pixel], sums[1]);
                     if let Some(shared) = &mut block.shared {
                         shared.runs[run][pixel] = [sums[2][0], sums[2][1], sums[2][2]];
                     }
@@ -267,6 +265,11 @@ fn capacity(pixels: usize, sharers: usize, most: u64) -> usize {
 /// Vectors of four numbers that a sample takes.
 fn vectors_of_sample(sharers: usize) -> usize {
     if sharers == 0 { 1 } else { 1 + RECORD_VECTORS as usize + sharers }
+}
+
+/// Adds the first three of four numbers.
+fn add(sum: &mut [f32; 3], numbers: [f32; 4]) {
+    sum.iter_mut().zip(numbers).for_each(|(sum, number)| *sum += number);
 }
 
 /// Samples in a sum, and vectors of four numbers that it takes: the sum, the sum of squares, and where pixels share paths what they share.

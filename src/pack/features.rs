@@ -75,6 +75,8 @@ pub struct Features {
     pub panes: bool,
     /// Thin panes of a colour; they count among chromatic media.
     pub tints: bool,
+    /// Media that only absorb.
+    pub absorbing: bool,
     /// Colours that depend on the triangle and the place on it.
     pub attributes: bool,
     /// Surfaces that only the far clip plane hides.
@@ -145,7 +147,7 @@ impl Features {
             phases: packed.media.iter().any(|medium| medium.phase != 0),
             emission,
             volume_lights: kind(LIGHT_VOLUME),
-            grids: media && packed.media.iter().any(|medium| medium.grids & !MEDIUM_SEALED != 0),
+            grids: media && packed.media.iter().any(|medium| medium.grids & !(MEDIUM_SEALED | MEDIUM_ABSORBS) != 0),
             voxels: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_VOXELS != 0),
             heights: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_HEIGHT != 0),
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
@@ -178,6 +180,8 @@ impl Features {
             }),
             panes: flag(SURFACE_PANE),
             tints,
+            absorbing: (packed.media.iter().skip(1))
+                .any(|medium| medium.grids & MEDIUM_ABSORBS != 0 || medium.flight_share < 1.0),
             attributes: packed
                 .textures
                 .iter()
@@ -245,6 +249,7 @@ impl Features {
             masks: true,
             panes: true,
             tints: true,
+            absorbing: true,
             attributes: true,
             slides: true,
             far_clip: true,
@@ -297,6 +302,7 @@ impl Features {
             ("HAS_MASK", self.masks),
             ("HAS_PANES", self.panes),
             ("HAS_TINTS", self.tints),
+            ("HAS_ABSORBING", self.absorbing),
             ("HAS_ATTRIBUTES", self.attributes),
             ("HAS_SLIDES", self.slides),
             ("HAS_FAR_CLIP", self.far_clip),

@@ -211,7 +211,9 @@ impl Packed {
         let Arranged { bvh, primitives, corners, immediate_count } = arrange(primitives, corners, immediate::MOST);
         let lights = lights.finish();
         sealed::mark(scene, &mut media);
+        flight::mark_absorbing(&mut media);
         flight::choose_equiangular(scene, &nesting, &frame, &lights, &mut media);
+        flight::choose_flight_shares(&mut media);
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
         filter::pack(&scene.film, &mut params, &mut values);
         params = Params {
@@ -331,6 +333,7 @@ const EMPTY_FEATURES: Features = Features {
     masks: false,
     panes: false,
     tints: false,
+    absorbing: false,
     attributes: false,
     slides: false,
     far_clip: false,
@@ -387,6 +390,7 @@ fn pack_media(
             collision_share,
             least_sigma_t,
             grids,
+            flight_share: 1.0,
             ..Medium::default()
         });
     }

@@ -90,6 +90,7 @@ pub struct Medium {
     pub least_sigma_t: f64,
     pub equiangular: f64,
     pub collision_share: f64,
+    pub flight_share: f64,
     pub grids: u32,
 }
 
@@ -253,6 +254,7 @@ impl From<&layout::Medium> for Medium {
             emission: from.emission.as_dvec3(),
             light: from.light,
             least_sigma_t: f64::from(from.least_sigma_t),
+            flight_share: f64::from(from.flight_share),
             equiangular: f64::from(from.equiangular),
             collision_share: f64::from(from.collision_share),
             grids: from.grids,

@@ -12,7 +12,7 @@ use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
 use super::path_aim::{find_aim, sample_next};
 use super::path_flight::{
     albedo_factor, end_flight, end_height_flight, end_voxel_flight, enter_medium, flight_point, flight_side, free_way,
-    near_distance, pass_medium,
+    near_distance, pass_medium, rare_collision_weight, rare_passage_weight,
 };
 use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
@@ -28,8 +28,8 @@ use super::path_surface::{
 use super::path_vertex::{Vertex, medium_towards, offset_origin, sides_agree, surface_point, to_surface_frame};
 use super::ray::offset_distance;
 use crate::pack::layout::{
-    LIGHT_VOLUME, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED,
-    SURFACE_MASK, SURFACE_ORIENTED, SURFACE_PANE, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
+    LIGHT_VOLUME, MEDIUM_ABSORBS, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE,
+    SURFACE_INVERTED, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_PANE, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
 };
 use glam::{DVec2, DVec3, UVec2, Vec4Swizzles};
 
@@ -211,9 +211,9 @@ fn passes_mask(tables: &Tables, path: &mut Path, surface: &Surface, place: &Plac
     u >= opacity
 }
 
-/// Goes on behind a coloured pane, whose colour is an optical depth of the flight; but no flight ends there. Instead the channel is chosen
-/// anew by what is left of each, and the throughput loses what all of them lose together.
-fn cross_pane(tables: &Tables, path: &mut Path, depth: DVec3) {
+/// Goes on behind a coloured pane, or a stretch of a medium that only absorbs. What it takes is an optical depth of the flight; but no
+/// flight ends there. Instead the channel is chosen anew by what is left of each, and the throughput loses what all of them lose together.
+fn pass_absorbing(tables: &Tables, path: &mut Path, depth: DVec3) {
     if max_component(depth) == 0.0 {
         return;
     }
@@ -223,9 +223,13 @@ fn cross_pane(tables: &Tables, path: &mut Path, depth: DVec3) {
     path.tau_mean += depth;
     let left = weights * exp_minus_rgb(path.tau_rgb);
     let sum = left.element_sum();
-    path.throughput *= sum / before;
-    path.alive = sum > 0.0;
-    path.channel = sample_channel(left / sum, sample_set(tables, path, MASK_SETS + path.crossings).w);
+    let passes = if before > 0.0 { sum / before } else { 0.0 };
+    path.throughput *= passes;
+    path.absorbed *= passes;
+    if sum > 0.0 && tables.features.chromatic {
+        path.channel = sample_channel(left / sum, sample_set(tables, path, MASK_SETS + path.crossings).w);
+        path.crossings += 1;
+    }
 }
 
 /// The one of the BSDFs of a surface that acts at this vertex: by the side, or by chance.
@@ -281,6 +285,7 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         let Medium { g, phase, .. } = medium;
         let (tangent, normal) = (DVec3::ZERO, path.direction);
         let albedo = end.weight * albedo_factor(tables, &medium, point);
+        path.absorbed *= rare_collision_weight(&medium, end.way);
         let (in_medium, base, fade) = (true, axis, 0.0);
         return Some(Vertex {
             point,
@@ -298,9 +303,18 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         });
     }
     // The optical depth of the way through the medium since `t_min`.
-    path.tau_left -= end.dense * medium.sigma_t[path.channel as usize];
-    path.tau_rgb += medium.sigma_t * end.dense;
-    path.tau_mean += medium.sigma_t * end.dense;
+    if medium.grids & MEDIUM_ABSORBS != 0 {
+        pass_absorbing(tables, path, medium.sigma_t * end.dense);
+    } else {
+        path.tau_left -= end.dense * medium.flight_share * medium.sigma_t[path.channel as usize];
+        if medium.flight_share < 1.0 {
+            let left = rare_passage_weight(&medium, end.dense);
+            path.throughput *= left;
+            path.absorbed *= left;
+        }
+        path.tau_rgb += medium.sigma_t * end.dense;
+        path.tau_mean += medium.sigma_t * end.dense;
+    }
     if !surface_hit {
         add_sky(tables, path);
         path.alive = false;
@@ -318,7 +332,7 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     }
     if crosses {
         if surface.flags & SURFACE_PANE != 0 {
-            cross_pane(tables, path, pane_depth(tables, surface, &place));
+            pass_absorbing(tables, path, pane_depth(tables, surface, &place));
         }
         path.anchor = point;
         cross_surface(tables, path, surface, hit);

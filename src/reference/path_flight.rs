@@ -35,6 +35,16 @@ pub fn free_way(path: &Path, medium: &Medium) -> f64 {
     free_flight(path.tau_left, medium.sigma_t[path.channel as usize])
 }
 
+/// The weight of a flight that goes on over that of one with the whole extinction coefficient, where flights take a part of it.
+pub fn rare_passage_weight(medium: &Medium, way: f64) -> f64 {
+    (-(1.0 - medium.flight_share) * medium.sigma_t.x * way).exp()
+}
+
+/// The same of a flight that ends.
+pub fn rare_collision_weight(medium: &Medium, way: f64) -> f64 {
+    if medium.flight_share > 0.0 { rare_passage_weight(medium, way) / medium.flight_share } else { 1.0 }
+}
+
 /// Where the flight ends on a ray that meets a surface at `t_end`, or nothing before `t_end`.
 pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, surface: bool) -> FlightEnd {
     let way = t_end - path.t_min;
@@ -50,8 +60,9 @@ pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, sur
     }
     let weights = channel_weights(path.throughput);
     if !mixed {
-        end.way = free_flight(path.tau_left, sigma);
+        end.way = free_flight(path.tau_left, medium.flight_share * sigma);
         end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * end.way, medium.sigma_t, medium.albedo);
+        end.weight *= rare_collision_weight(medium, end.way);
         return end;
     }
     let scatters = one_minus_exp_minus(sigma * length);

@@ -96,7 +96,9 @@ pub fn share_vertex(tables: &Tables, path: &mut Path, vertex: &mut Vertex) {
         path.record.base = path.radiance;
         path.radiance = DVec3::ZERO;
         path.before = if vertex.in_medium { path.throughput * vertex.albedo } else { path.throughput };
-        path.throughput = DVec3::ONE;
+        // The densities are those of flights that end in media that only absorb as well. A path that does not brings so much less instead.
+        path.throughput = DVec3::splat(path.absorbed);
+        path.before /= path.absorbed.max(1e-30);
         if vertex.in_medium {
             vertex.albedo = medium_at(tables, path.medium).albedo;
         }

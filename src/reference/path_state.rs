@@ -6,7 +6,7 @@ use super::math::{exp_minus_rgb, minus_log_1m};
 use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
 use super::path_share::Record;
 use super::sampler::{group_index, group_seed, half_index, half_seed, lens_key, point_index, set_key, shifted_point};
-use crate::pack::layout::{self, MEDIUM_HEIGHT, MEDIUM_VOXELS};
+use crate::pack::layout::{self, MEDIUM_ABSORBS, MEDIUM_HEIGHT, MEDIUM_VOXELS};
 use crate::pack::sobol::{LENS_SET, SOBOL_SETS};
 use glam::{DVec2, DVec3, DVec4};
 
@@ -84,6 +84,8 @@ pub struct Path {
     pub channel: u32,
     /// Probability to pass the masks between the last event and `t_min`.
     pub passed: f64,
+    /// What media that only absorb have left since the last event.
+    pub absorbed: f64,
     /// How many masks the path has passed or met.
     pub crossings: u32,
     /// Where the far clip plane ends a camera ray.
@@ -208,13 +210,13 @@ pub fn goes_by_lamps(path: &Path, medium: &Medium) -> bool {
 /// Distance to the end of the flight with the extinction that holds from `t_min` on.
 pub fn flight_end(tables: &Tables, path: &Path) -> f64 {
     let medium = medium_at(tables, path.medium);
-    if medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT) != 0 {
+    if medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT | MEDIUM_ABSORBS) != 0 {
         return path.far_end;
     }
     let flight = if goes_by_lamps(path, medium) {
         free_flight(MAX_FLIGHT_TAU, medium.least_sigma_t)
     } else {
-        free_flight(path.tau_left, medium.sigma_t[path.channel as usize])
+        free_flight(path.tau_left, medium.flight_share * medium.sigma_t[path.channel as usize])
     };
     (path.t_min + flight).min(path.far_end)
 }
@@ -224,6 +226,7 @@ pub fn begin_segment(tables: &Tables, path: &mut Path, u: DVec2) {
     path.last = NONE;
     path.shadow = false;
     path.passed = 1.0;
+    path.absorbed = 1.0;
     path.tau_left = minus_log_1m(u.x);
     path.tau_rgb = DVec3::ZERO;
     path.channel = sample_channel(channel_weights(path.throughput), u.y);

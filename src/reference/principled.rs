@@ -70,12 +70,12 @@ fn principled_fresnel(surface: &Surface, f: f64, grazing: f64) -> DVec3 {
 
 /// The diffuse body and the sheen on it, without the cosine of wo; m is half way between the two directions.
 fn principled_body(surface: &Surface, opaque: f64, wi: DVec3, wo: DVec3, m: DVec3) -> DVec3 {
-    let (fi, fo, cos_d) = (schlick_weight(wi.z), schlick_weight(wo.z), wo.dot(m));
+    let (f_in, f_out, cos_d) = (schlick_weight(wi.z), schlick_weight(wo.z), wo.dot(m));
     let retro = 2.0 * surface.specular.x * cos_d * cos_d;
-    let body = (1.0 - 0.5 * fi) * (1.0 - 0.5 * fo) + retro * (fo + fi + fo * fi * (retro - 1.0));
+    let body = (1.0 - 0.5 * f_in) * (1.0 - 0.5 * f_out) + retro * (f_out + f_in + f_out * f_in * (retro - 1.0));
     // As if light had gone some way below the surface, after Hanrahan and Krueger (1993).
     let mix = |a: f64, b: f64, share: f64| a + (b - a) * share;
-    let below = mix(1.0, 0.5 * retro, fo) * mix(1.0, 0.5 * retro, fi);
+    let below = mix(1.0, 0.5 * retro, f_out) * mix(1.0, 0.5 * retro, f_in);
     let below = 1.25 * (below * (1.0 / (wo.z + wi.z) - 0.5) + 0.5);
     let found = surface.reflectance * (opaque * FRAC_1_PI * mix(body, below, surface.transmittance.z));
     let sheen = DVec3::ONE.lerp(principled_tint(surface.reflectance), surface.extinction.y);

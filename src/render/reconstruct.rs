@@ -141,7 +141,7 @@ impl Weights {
         let pixels = half.mean.len();
         let average = half.mean.iter().sum::<DVec3>() / pixels as f64;
         let floor = FLOOR * average.max(DVec3::splat(FLOOR * average.max_element()));
-        if !(floor.min_element() > 0.0) {
+        if floor.cmple(DVec3::ZERO).any() {
             return None;
         }
         let expected: Vec<DVec3> = half.mean.iter().map(|mean| mean.max(DVec3::ZERO) + floor).collect();
