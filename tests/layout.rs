@@ -196,7 +196,7 @@ fn a_struct_that_differs_is_noticed() {
     let mut fields = Medium::FIELDS.to_vec();
     fields[3].offset += 4;
     check(&module, &[Expected { fields: fields.leak(), ..medium() }]).expect_err("another offset");
-    check(&module, &[Expected { size: 80, ..medium() }]).expect_err("another size");
+    check(&module, &[Expected { size: 96, ..medium() }]).expect_err("another size");
 }
 
 #[test]
