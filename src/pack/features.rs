@@ -212,7 +212,7 @@ impl Features {
         }
     }
 
-    /// The same kernel with everything compiled in: it must render the same image.
+    /// The same kernel with everything compiled in, but for principled surfaces: it must render the same image.
     pub fn everything(self) -> Features {
         Features {
             media: true,
@@ -242,7 +242,8 @@ impl Features {
             conductor: true,
             plastic: true,
             rough_plastic: true,
-            principled: true,
+            // So much code that drivers take many times as long for it.
+            principled: self.principled,
             textures: true,
             anisotropic: true,
             shading_normals: true,
