@@ -164,7 +164,7 @@ fn memory(scene: &Scene, packed: &Packed) -> Value {
         .sum();
     let crop = scene.film.crop;
     // Whether pixels share their paths is known only after a pilot run: the most that it may take.
-    let may_share = scene.moments.is_none() && tyndall::pilot::can_share_paths(&packed);
+    let may_share = scene.moments.is_none() && tyndall::pilot::can_share_paths(packed);
     let sharers = if may_share { tyndall::pilot::MOST_SHARERS } else { 0 };
     let (device_work, host_blocks) = backend::working_memory([crop.width, crop.height], sharers);
     // Sums and sums of squares of three channels in double precision, and where pixels share paths a sum for each half and shift.
