@@ -331,6 +331,7 @@ impl Features {
         ]
         .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
         .concat();
-        switches + &numbers
+        let with_mask = if self.masks { "#define WITH_MASK\n" } else { "" };
+        switches + &numbers + with_mask
     }
 }
