@@ -14,7 +14,13 @@ use tyndall::scene::{Camera, Film, Light, Medium, Phase, Scene, Volume};
 
 #[test]
 fn device_and_reference_follow_the_same_paths() {
-    for (name, scene) in [("voxels", fields::voxels()), ("smoke", fields::smoke()), ("fog", fields::height_fog())] {
+    let cases = [
+        ("voxels", fields::voxels()),
+        ("smoke", fields::smoke()),
+        ("smoke in a dark ball", fields::smoke_in_a_dark_ball()),
+        ("fog", fields::height_fog()),
+    ];
+    for (name, scene) in cases {
         let packed = scenes::pack(&scene, 7);
         let (device, reference) = (images::on_device(&packed, 16), images::by_reference(&packed, 16));
         let share = images::compare(&device, &reference).unwrap_or_else(|why| panic!("{name}: {why}"));

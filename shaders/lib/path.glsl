@@ -200,13 +200,6 @@ void pass_absorbing(inout Path path, vec3 depth) {
     if (max_component(depth) == 0.0) {
         return;
     }
-    if (!HAS_CHROMATIC) {
-        float left = exp_minus(depth.x);
-        path.tau += depth.x;
-        path.throughput *= left;
-        path.absorbed *= left;
-        return;
-    }
     vec3 weights = channel_weights(path.throughput);
     float before = dot(weights, exp_minus(path.tau_rgb));
     path.tau_rgb += depth;
@@ -284,9 +277,7 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         path.normal = path.direction;
         path.left = NONE;
         vertex.point = flight_point(path, primitive, side, end.way);
-        if (HAS_SHARING && HAS_CHROMATIC) {
-            path.absorbed *= rare_collision_weight(medium, end.way);
-        } else if (HAS_SHARING) {
+        if (HAS_SHARING) {
             path.tau += medium.sigma_t.x * end.way;
             path.absorbed *= rare_collision_weight(medium, end.way);
         }
@@ -295,7 +286,7 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         vertex.albedo = HAS_GRIDS ? end.weight * albedo_factor(medium, vertex.point) : end.weight;
         return true;
     }
-    if (HAS_ABSORBING && (medium.grids & MEDIUM_ABSORBS) != 0u) {
+    if (HAS_ABSORBING && HAS_CHROMATIC && medium.flight_share == 0.0) {
         pass_absorbing(path, medium.sigma_t * (t - path.t_min));
     } else if (HAS_MEDIA) {
         // The optical depth of the way through the medium since t_min.

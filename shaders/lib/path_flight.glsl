@@ -25,7 +25,7 @@ float rare_passage_weight(Medium medium, float way) {
 }
 
 float rare_collision_weight(Medium medium, float way) {
-    return HAS_ABSORBING && medium.flight_share > 0.0 ? rare_passage_weight(medium, way) / medium.flight_share : 1.0;
+    return HAS_ABSORBING ? rare_passage_weight(medium, way) / medium.flight_share : 1.0;
 }
 
 // Where the flight ends on a ray that meets a surface at t_end, or nothing before t_end. A flight in a medium with equiangular

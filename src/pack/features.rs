@@ -75,7 +75,7 @@ pub struct Features {
     pub panes: bool,
     /// Thin panes of a colour; they count among chromatic media.
     pub tints: bool,
-    /// Media that only absorb.
+    /// Media in which flights end less often than light is lost, or never.
     pub absorbing: bool,
     /// Colours that depend on the triangle and the place on it.
     pub attributes: bool,
@@ -147,7 +147,7 @@ impl Features {
             phases: packed.media.iter().any(|medium| medium.phase != 0),
             emission,
             volume_lights: kind(LIGHT_VOLUME),
-            grids: media && packed.media.iter().any(|medium| medium.grids & !(MEDIUM_SEALED | MEDIUM_ABSORBS) != 0),
+            grids: media && packed.media.iter().any(|medium| medium.grids & !MEDIUM_SEALED != 0),
             voxels: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_VOXELS != 0),
             heights: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_HEIGHT != 0),
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
@@ -180,8 +180,7 @@ impl Features {
             }),
             panes: flag(SURFACE_PANE),
             tints,
-            absorbing: (packed.media.iter().skip(1))
-                .any(|medium| medium.grids & MEDIUM_ABSORBS != 0 || medium.flight_share < 1.0),
+            absorbing: packed.media.iter().any(|medium| medium.flight_share < 1.0),
             attributes: packed
                 .textures
                 .iter()

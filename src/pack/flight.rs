@@ -1,7 +1,7 @@
 //! How distances are sampled in each medium.
 
 use super::frame::{Bounds, Frame};
-use super::layout::{LIGHT_VOLUME, Light, MEDIUM_ABSORBS, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, Medium};
+use super::layout::{LIGHT_VOLUME, Light, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, Medium};
 use super::lights::is_near;
 use super::nesting::Nesting;
 use crate::scene::{MediumId, Scene};
@@ -28,27 +28,18 @@ fn is_lamp(light: &Light) -> bool {
     is_near(light) && light.kind != LIGHT_VOLUME
 }
 
-/// Marks the media that only absorb: what a flight loses there is known.
-pub fn mark_absorbing(media: &mut [Medium]) {
-    for medium in media.iter_mut().skip(1) {
-        let varies = medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT) != 0;
-        let dark = medium.albedo == Vec3::ZERO && medium.emission == Vec3::ZERO;
-        if dark && !varies && medium.sigma_t != Vec3::ZERO {
-            medium.grids |= MEDIUM_ABSORBS;
-        }
-    }
-}
-
-/// Where little is scattered, most of what is seen came straight through: flights that end less often, with a weight, see more of it. Only
-/// where all media are gray: else flights choose between channels.
+/// Chooses the part of the extinction coefficient that flights are sampled by. In media that only absorb, none: what light loses there is
+/// known. Where little is scattered, most of what is seen came straight through: flights that end less often, with a weight, see more of
+/// it; only where all media are gray, for else flights choose between channels.
 pub fn choose_flight_shares(media: &mut [Medium]) {
-    let gray = |v: Vec3| v.min_element() == v.max_element();
-    if !media.iter().all(|medium| gray(medium.sigma_t)) {
-        return;
-    }
+    let gray = media.iter().all(|medium| medium.sigma_t.min_element() == medium.sigma_t.max_element());
     for medium in media.iter_mut().skip(1) {
-        let plain = medium.grids & !MEDIUM_SEALED == 0 && medium.equiangular == 0.0 && medium.emission == Vec3::ZERO;
-        if plain {
+        if medium.grids & !MEDIUM_SEALED != 0 || medium.equiangular > 0.0 || medium.emission != Vec3::ZERO {
+            continue;
+        }
+        if medium.albedo == Vec3::ZERO {
+            medium.flight_share = 0.0;
+        } else if gray {
             let bright = (medium.albedo.max_element() - DARK) / (BRIGHT - DARK);
             medium.flight_share = LEAST_SHARE + (1.0 - LEAST_SHARE) * bright.clamp(0.0, 1.0);
         }

@@ -183,7 +183,7 @@ gpu_struct! {
         /// 0: homogeneous. Else the index plus one of the first of three grids (low 24 bits), factors of `sigma_t`, `albedo` and
         /// `emission`, and the `MEDIUM_` bits that say which of these there are.
         grids: u32,
-        /// The part of the extinction coefficient that free flights are sampled by, in (0, 1]; the rest is a weight.
+        /// The part of the extinction coefficient that free flights are sampled by, in \[0, 1\]; the rest is a weight. 0: no flight ends here.
         flight_share: f32,
         /// Fills the sixteen bytes.
         unused_1: u32,
@@ -568,8 +568,6 @@ pub const MEDIUM_ALBEDO_GRID: u32 = 1 << 26;
 pub const MEDIUM_EMISSION_GRID: u32 = 1 << 27;
 /// [`Medium::grids`]: no shadow ray leaves the medium, and light is not sampled in it.
 pub const MEDIUM_SEALED: u32 = 1 << 28;
-/// [`Medium::grids`]: the medium neither scatters nor emits, so no flight ends in it.
-pub const MEDIUM_ABSORBS: u32 = 1 << 29;
 /// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
 pub const TILE: u32 = 8;
 /// Vectors of four numbers in the record of a path that pixels share: see `lib/path_share.glsl`.
@@ -646,7 +644,6 @@ pub fn glsl() -> String {
         ("MEDIUM_VOXELS", MEDIUM_VOXELS),
         ("MEDIUM_HEIGHT", MEDIUM_HEIGHT),
         ("MEDIUM_SEALED", MEDIUM_SEALED),
-        ("MEDIUM_ABSORBS", MEDIUM_ABSORBS),
         ("MEDIUM_ALBEDO_GRID", MEDIUM_ALBEDO_GRID),
         ("MEDIUM_EMISSION_GRID", MEDIUM_EMISSION_GRID),
         ("TILE", TILE),

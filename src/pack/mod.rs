@@ -211,7 +211,6 @@ impl Packed {
         let Arranged { bvh, primitives, corners, immediate_count } = arrange(primitives, corners, immediate::MOST);
         let lights = lights.finish();
         sealed::mark(scene, &mut media);
-        flight::mark_absorbing(&mut media);
         flight::choose_equiangular(scene, &nesting, &frame, &lights, &mut media);
         flight::choose_flight_shares(&mut media);
         let mut params = pack_camera(scene, &frame, medium_index(nesting.camera));
@@ -368,7 +367,7 @@ fn pack_media(
     grids: &mut GridTable,
     values: &mut Vec<f32>,
 ) -> Result<Vec<Medium>, PackError> {
-    let mut media = vec![Medium::default()];
+    let mut media = vec![Medium { flight_share: 1.0, ..Medium::default() }];
     for (index, medium) in scene.media.iter().enumerate() {
         let id = MediumId(index as u32);
         let sigma_t = frame.per_length(medium.sigma_t);

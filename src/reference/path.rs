@@ -28,8 +28,8 @@ use super::path_surface::{
 use super::path_vertex::{Vertex, medium_towards, offset_origin, sides_agree, surface_point, to_surface_frame};
 use super::ray::offset_distance;
 use crate::pack::layout::{
-    LIGHT_VOLUME, MEDIUM_ABSORBS, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE,
-    SURFACE_INVERTED, SURFACE_MASK, SURFACE_ORIENTED, SURFACE_PANE, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
+    LIGHT_VOLUME, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED,
+    SURFACE_MASK, SURFACE_ORIENTED, SURFACE_PANE, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
 };
 use glam::{DVec2, DVec3, UVec2, Vec4Swizzles};
 
@@ -226,7 +226,7 @@ fn pass_absorbing(tables: &Tables, path: &mut Path, depth: DVec3) {
     let passes = if before > 0.0 { sum / before } else { 0.0 };
     path.throughput *= passes;
     path.absorbed *= passes;
-    if sum > 0.0 && tables.features.chromatic {
+    if sum > 0.0 {
         path.channel = sample_channel(left / sum, sample_set(tables, path, MASK_SETS + path.crossings).w);
         path.crossings += 1;
     }
@@ -303,7 +303,7 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         });
     }
     // The optical depth of the way through the medium since `t_min`.
-    if medium.grids & MEDIUM_ABSORBS != 0 {
+    if medium.flight_share == 0.0 && tables.features.chromatic {
         pass_absorbing(tables, path, medium.sigma_t * end.dense);
     } else {
         path.tau_left -= end.dense * medium.flight_share * medium.sigma_t[path.channel as usize];

@@ -42,7 +42,7 @@ pub fn rare_passage_weight(medium: &Medium, way: f64) -> f64 {
 
 /// The same of a flight that ends.
 pub fn rare_collision_weight(medium: &Medium, way: f64) -> f64 {
-    if medium.flight_share > 0.0 { rare_passage_weight(medium, way) / medium.flight_share } else { 1.0 }
+    rare_passage_weight(medium, way) / medium.flight_share
 }
 
 /// Where the flight ends on a ray that meets a surface at `t_end`, or nothing before `t_end`.

@@ -82,6 +82,16 @@ pub fn voxels() -> Scene {
     scene
 }
 
+/// The same with a large ball about them that only absorbs.
+pub fn smoke_in_a_dark_ball() -> Scene {
+    let mut scene = smoke();
+    let dark = scene.add_medium(gray(0.4, 0.0, 0.0));
+    scene.shapes.push(Shape::boundary("dark", ball(DVec3::ZERO, 3.0), dark));
+    scene.lights.clear();
+    scene.lights.push(Light::Constant { radiance: v(0.6, 0.7, 0.8) });
+    scene
+}
+
 /// Gray voxels in a box of their own, over a floor, in the sun; and glowing voxels in a homogeneous medium.
 pub fn smoke() -> Scene {
     let mut scene = still_life(false);
