@@ -17,6 +17,11 @@ pub fn run_shift(sample_index: u32) -> u32 {
     sample_index / (2 * RUN_SAMPLES) % RUN_SHIFTS
 }
 
+/// A sample that has the shift.
+pub fn first_of_shift(shift: u32) -> u32 {
+    2 * RUN_SAMPLES * shift
+}
+
 /// Which half of the render a sample belongs to, 0 or 1.
 pub fn run_half(sample_index: u32) -> u32 {
     sample_index / RUN_SAMPLES % 2

@@ -41,8 +41,6 @@ pub struct SharedSums {
 pub struct SharedSum {
     /// Samples in each pixel.
     pub count: u32,
-    /// Index of one of the samples, which tells the shift; 0 if there are none.
-    pub sample_index: u32,
     /// Σ shared radiance of each pixel; empty if there are no samples.
     pub sums: Vec<[f64; 3]>,
 }
@@ -95,7 +93,6 @@ impl Film {
         for (first, run) in (block.first..).step_by(RUN_SAMPLES as usize).zip(&shared.runs) {
             let sum = &mut sums.halves[run_half(first) as usize][run_shift(first) as usize];
             sum.sums.resize(pixels, [0.0; 3]);
-            sum.sample_index = first;
             sum.count += RUN_SAMPLES.min(block.first + block.count - first);
             accumulate(&mut sum.sums, run);
         }

@@ -20,7 +20,7 @@
 //! random numbers of their own: the weights of each half are measured on the other one.
 
 use super::film::{Film, SharedSum, SharedSums};
-use crate::pack::groups::{group_offset, group_size};
+use crate::pack::groups::{first_of_shift, group_offset, group_size};
 use glam::DVec3;
 
 /// A pixel is taken to share at least this part of the mean of all.
@@ -41,37 +41,25 @@ const MOST_STEPS: usize = 200;
 pub fn image(film: &Film, width: u32) -> Vec<[f64; 3]> {
     let mut image = film.mean();
     let Some(shared) = film.shared() else { return image };
-    let Some(better) = shared_part(shared, width as usize) else { return image };
-    let plain = mean(shared.halves.iter().flatten(), image.len());
-    for ((pixel, better), plain) in image.iter_mut().zip(better).zip(plain) {
-        for q in 0..3 {
-            pixel[q] += better[q] - plain[q];
-        }
+    let Some(changes) = changes(shared, width as usize) else { return image };
+    for (pixel, change) in image.iter_mut().zip(changes) {
+        *pixel = (DVec3::from(*pixel) + change).to_array();
     }
     image
 }
 
-/// Mean of sums over all their samples.
-fn mean<'a>(sums: impl Iterator<Item = &'a SharedSum>, pixels: usize) -> Vec<DVec3> {
-    let mut mean = vec![DVec3::ZERO; pixels];
-    let mut count = 0.0;
-    for sum in sums {
-        count += f64::from(sum.count);
-        mean.iter_mut().zip(&sum.sums).for_each(|(mean, sum)| *mean += DVec3::from_array(*sum));
-    }
-    mean.iter_mut().for_each(|mean| *mean /= count);
-    mean
-}
-
-/// The shared part, if it is known better than by its mean.
-fn shared_part(shared: &SharedSums, width: usize) -> Option<Vec<DVec3>> {
+/// By how much the shared part differs from its mean, if it is known better.
+fn changes(shared: &SharedSums, width: usize) -> Option<Vec<DVec3>> {
     let halves = shared.halves.each_ref().map(|half| Half::of(half, shared.sharers, width));
     let [one, two] = [halves[0].as_ref()?, halves[1].as_ref()?];
     let (by_one, by_two) = rayon::join(|| Weights::of(one), || Weights::of(two));
     let (by_one, by_two) = (by_one?, by_two?);
-    let (first, second) = rayon::join(|| solve(one, &by_two), || solve(two, &by_one));
-    let part = one.samples / (one.samples + two.samples);
-    Some(first.into_iter().zip(second).map(|(a, b)| a * part + b * (1.0 - part)).collect())
+    let change = |half: &Half, weights: &Weights| -> Vec<DVec3> {
+        let part = half.samples / (one.samples + two.samples);
+        solve(half, weights).into_iter().zip(&half.mean).map(|(better, mean)| (better - *mean) * part).collect()
+    };
+    let (first, second) = rayon::join(|| change(one, &by_two), || change(two, &by_one));
+    Some(first.into_iter().zip(second).map(|(a, b)| a + b).collect())
 }
 
 /// The samples of a half whose groups lay alike.
@@ -84,9 +72,10 @@ struct Observation<'a> {
 }
 
 impl Observation<'_> {
-    fn of(sum: &SharedSum, sharers: u32, width: usize) -> Observation<'_> {
+    /// `shift` is one of those of the groups.
+    fn of(sum: &SharedSum, shift: u32, sharers: u32, width: usize) -> Observation<'_> {
         let [columns, rows] = group_size(sharers).map(|side| side as usize);
-        let [dx, dy] = group_offset(sharers, sum.sample_index).map(|shift| shift as usize);
+        let [dx, dy] = group_offset(sharers, first_of_shift(shift)).map(|shift| shift as usize);
         let across = (width + dx).div_ceil(columns);
         let group = |pixel: usize| (((pixel / width + dy) / rows) * across + (pixel % width + dx) / columns) as u32;
         let group_count = across * (sum.sums.len() / width + dy).div_ceil(rows);
@@ -115,11 +104,16 @@ struct Half<'a> {
 impl Half<'_> {
     /// Nothing, if the groups lay in one way only, or if a sample is not finite.
     fn of(sums: &[SharedSum], sharers: u32, width: usize) -> Option<Half<'_>> {
-        let observations: Vec<Observation> =
-            (sums.iter().filter(|sum| sum.count > 0)).map(|sum| Observation::of(sum, sharers, width)).collect();
-        let pixels = observations.first()?.sums.len();
-        let mean = mean(sums.iter(), pixels);
-        let samples = observations.iter().map(|observation| observation.samples).sum();
+        let observations: Vec<Observation> = (0..)
+            .zip(sums)
+            .filter(|(_, sum)| sum.count > 0)
+            .map(|(shift, sum)| Observation::of(sum, shift, sharers, width))
+            .collect();
+        let samples: f64 = observations.iter().map(|observation| observation.samples).sum();
+        let mut mean = vec![DVec3::ZERO; observations.first()?.sums.len()];
+        for observation in &observations {
+            mean.iter_mut().zip(observation.sums).for_each(|(mean, sum)| *mean += DVec3::from_array(*sum) / samples);
+        }
         let usable = observations.len() > 1 && mean.iter().all(|mean| mean.is_finite());
         usable.then_some(Half { samples, observations, mean, width })
     }
