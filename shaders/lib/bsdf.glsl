@@ -256,6 +256,11 @@ BsdfSample sample_smooth_dielectric(Surface surface, vec3 wi, float lobe) {
     return BsdfSample(vec3(-wi.xy / eta, cos_t), surface.transmittance / (eta * eta), 0.0, eta);
 }
 
+// A direction with the weight of what is evaluated there; none without a density.
+BsdfSample weighted_sample(BsdfSample found, BsdfValue value) {
+    return value.pdf <= 0.0 ? BsdfSample(vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0, 1.0) : BsdfSample(found.direction, value.value / value.pdf, value.pdf, found.eta);
+}
+
 // u chooses within a lobe, `lobe` between them.
 BsdfSample sample_bsdf(Surface surface, vec3 wi, vec2 u, float lobe) {
     BsdfSample none = BsdfSample(vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0, 1.0);
@@ -308,13 +313,7 @@ BsdfSample sample_bsdf(Surface surface, vec3 wi, vec2 u, float lobe) {
             }
         }
     }
-    BsdfValue value = eval_bsdf(surface, wi, found.direction);
-    if (value.pdf <= 0.0) {
-        return none;
-    }
-    found.pdf = value.pdf;
-    found.weight = value.value / value.pdf;
-    return found;
+    return weighted_sample(found, eval_bsdf(surface, wi, found.direction));
 }
 
 // Whether sample_bsdf finds directions with a density at all, so that light sampling can compete.

@@ -160,11 +160,5 @@ BsdfSample sample_principled(Surface surface, vec3 wi, vec2 u, float lobe) {
             return none;
         }
     }
-    BsdfValue value = eval_principled(surface, wi, found.direction);
-    if (value.pdf <= 0.0) {
-        return none;
-    }
-    found.pdf = value.pdf;
-    found.weight = value.value / value.pdf;
-    return found;
+    return weighted_sample(found, eval_principled(surface, wi, found.direction));
 }

@@ -268,6 +268,11 @@ fn sample_smooth_dielectric(surface: &Surface, wi: DVec3, lobe: f64) -> BsdfSamp
     BsdfSample { direction, weight: surface.transmittance / (eta * eta), pdf: 0.0, eta }
 }
 
+/// A direction with the weight of what is evaluated there; none without a density.
+pub(super) fn weighted_sample(found: BsdfSample, BsdfValue { value, pdf }: BsdfValue) -> BsdfSample {
+    if pdf <= 0.0 { NO_SAMPLE } else { BsdfSample { pdf, weight: value / pdf, ..found } }
+}
+
 /// Samples a direction. `u` chooses within a lobe, `lobe` between them; `values` holds the tables of surfaces.
 pub fn sample_bsdf(surface: &Surface, values: &[f32], wi: DVec3, u: DVec2, lobe: f64) -> BsdfSample {
     let kind = bsdf_kind(surface);
@@ -325,11 +330,7 @@ pub fn sample_bsdf(surface: &Surface, values: &[f32], wi: DVec3, u: DVec2, lobe:
             }
         }
     }
-    let BsdfValue { value, pdf } = eval_bsdf(surface, values, wi, found.direction);
-    if pdf <= 0.0 {
-        return NO_SAMPLE;
-    }
-    BsdfSample { pdf, weight: value / pdf, ..found }
+    weighted_sample(found, eval_bsdf(surface, values, wi, found.direction))
 }
 
 /// Whether [`sample_bsdf`] finds directions with a density at all, so that light sampling can compete.

@@ -4,7 +4,7 @@
 use super::bindings::Surface;
 use super::bsdf::{
     BsdfSample, BsdfValue, NO_SAMPLE, facet_density, facet_masking, facet_pdf, fresnel_dielectric, refract_at,
-    roughness, sample_facet,
+    roughness, sample_facet, weighted_sample,
 };
 use super::math::{exp_minus, one_minus_exp_minus};
 use super::warp::{from_polar, square_to_cosine_hemisphere};
@@ -170,9 +170,5 @@ pub fn sample_principled(surface: &Surface, wi: DVec3, u: DVec2, lobe: f64) -> B
             return NO_SAMPLE;
         }
     }
-    let BsdfValue { value, pdf } = eval_principled(surface, wi, found.direction);
-    if pdf <= 0.0 {
-        return NO_SAMPLE;
-    }
-    BsdfSample { pdf, weight: value / pdf, ..found }
+    weighted_sample(found, eval_principled(surface, wi, found.direction))
 }
