@@ -32,9 +32,10 @@ pub fn open(
     let mut packed = Packed::new(scene, seed).map_err(|error| CliError::Scene(error.to_string()))?;
     let mut seen = None;
     if with_pilot {
-        pilot::run(&mut packed, sharing);
-        // Second moments are those of paths.
-        seen = if scene.moments.is_none() { Seen::find(&mut packed) } else { None };
+        // Second moments are those of paths that belong to one pixel and bring all of its light.
+        let moments = scene.moments.is_some();
+        pilot::run(&mut packed, sharing && !moments);
+        seen = if moments { None } else { Seen::find(&mut packed) };
     }
     packed.warnings.iter().for_each(|warning| warn(warning));
     if choice == "reference" {

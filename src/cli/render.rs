@@ -39,9 +39,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode, CliError> {
         doubts(args, &scene);
     }
 
-    // Second moments are those of paths that belong to one pixel.
-    let sharing = !args.no_sharing && scene.moments.is_none();
-    let mut backend = backend::open(&args.device, &scene, args.seed, !args.no_pilot, sharing, &mut warn)?;
+    let mut backend = backend::open(&args.device, &scene, args.seed, !args.no_pilot, !args.no_sharing, &mut warn)?;
     // From here on a signal leads to an image. Before, it simply ends the program.
     let interrupt = interrupt::flag()?;
     render(args, &scene, spp, &mut *backend, &interrupt, &output)
