@@ -72,12 +72,13 @@ fn parallel_light_through_an_absorber() {
     check(seen(&scene), expected, 2e-5).unwrap_or_else(|why| panic!("{why}"));
     check(seen(&scene) * 1.0002, expected, 2e-5).expect_err("a little too bright");
     // Nothing comes through a medium without an end.
-    let mut scene = floor(DVec3::ZERO);
-    let medium = scene.add_medium(absorber);
-    scene.camera.medium = Some(medium);
-    scene.lights.push(Light::Directional { direction, irradiance: DVec3::ONE });
-    scene.lights.push(Light::Envmap { bitmap: scenes::sunny(), scale: 1.0, to_world: DMat3::IDENTITY });
-    assert_eq!(seen(&scene), DVec3::ZERO);
+    for medium in [absorber, scenes::gray(1.0, 0.0, 0.0)] {
+        let mut scene = floor(DVec3::ZERO);
+        scene.camera.medium = Some(scene.add_medium(medium));
+        scene.lights.push(Light::Directional { direction, irradiance: DVec3::ONE });
+        scene.lights.push(Light::Envmap { bitmap: scenes::sunny(), scale: 1.0, to_world: DMat3::IDENTITY });
+        assert_eq!(seen(&scene), DVec3::ZERO);
+    }
 }
 
 #[test]

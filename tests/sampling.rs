@@ -344,11 +344,12 @@ fn lights_give_the_irradiance_of_closed_forms() {
     }
 }
 
-/// What the sampler's kernel finds for (seed, pixel, set, index).
+/// The sampler's numbers for (seed, pixel, set, index).
 fn numbers(inputs: &[[u32; 4]]) -> Vec<[f64; 4]> {
     let table = sobol::points();
-    let outputs: Vec<[u32; 4]> = run("sampler", inputs, &[bytemuck::cast_slice(&table)], inputs.len(), inputs.len());
-    outputs.into_iter().map(|output| output.map(f32::from_bits).map(f64::from)).collect()
+    let outputs: Vec<[u32; 4]> =
+        run("sampler", inputs, &[bytemuck::cast_slice(&table)], inputs.len(), 2 * inputs.len());
+    outputs.chunks(2).map(|output| output[0].map(f32::from_bits).map(f64::from)).collect()
 }
 
 /// Points of a set for some samples of a pixel.

@@ -27,12 +27,18 @@ fn cases(side: u32) -> Vec<(&'static str, Scene)> {
         }
         scene
     };
-    let (dark, colored) = (absorbing(v(2.0, 2.0, 2.0)), absorbing(v(0.5, 2.0, 4.0)));
+    let gray = |albedo: f64| {
+        let mut scene = scenes::gray_box();
+        scene.media[0] = scenes::gray(2.0, albedo, 0.6);
+        scene
+    };
     cases.extend([
         ("wide filter", wide),
         ("eager roulette", eager),
-        ("absorbing", dark),
-        ("colours absorbed", colored),
+        ("absorbing", absorbing(v(2.0, 2.0, 2.0))),
+        ("colours absorbed", absorbing(v(0.5, 2.0, 4.0))),
+        ("black ball", gray(0.0)),
+        ("dim ball", gray(0.2)),
     ]);
     for (_, scene) in &mut cases {
         scene.film = Film { filter: scene.film.filter, ..Film::new(side, side) };

@@ -208,13 +208,15 @@ void pass_absorbing(inout Path path, vec3 depth) {
     }
     vec3 left = weights * exp_minus(path.tau_rgb);
     float sum = sum_components(left);
-    float passes = before > 0.0 ? sum / before : 0.0;
+    if (sum == 0.0) {
+        path.alive = false;
+        return;
+    }
+    float passes = sum / before;
     path.throughput *= passes;
     path.absorbed *= passes;
-    if (sum > 0.0) {
-        path.channel = sample_channel(left / sum, sample_set(path, MASK_SETS + path.crossings).w);
-        path.crossings += 1u;
-    }
+    path.channel = sample_channel(left / sum, sample_set(path, MASK_SETS + path.crossings).w);
+    path.crossings += 1u;
 }
 
 // Puts the one of the BSDFs of a surface in its place that acts at this vertex: by the side, or by chance. A choice has the share of the
@@ -288,6 +290,9 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
     }
     if (HAS_ABSORBING && HAS_CHROMATIC && medium.flight_share == 0.0) {
         pass_absorbing(path, medium.sigma_t * (t - path.t_min));
+        if (!path.alive) {
+            return false;
+        }
     } else if (HAS_MEDIA) {
         // The optical depth of the way through the medium since t_min.
         float way = HAS_GRIDS ? end.dense : t - path.t_min;

@@ -223,13 +223,15 @@ fn pass_absorbing(tables: &Tables, path: &mut Path, depth: DVec3) {
     path.tau_mean += depth;
     let left = weights * exp_minus_rgb(path.tau_rgb);
     let sum = left.element_sum();
-    let passes = if before > 0.0 { sum / before } else { 0.0 };
+    if sum == 0.0 {
+        path.alive = false;
+        return;
+    }
+    let passes = sum / before;
     path.throughput *= passes;
     path.absorbed *= passes;
-    if sum > 0.0 {
-        path.channel = sample_channel(left / sum, sample_set(tables, path, MASK_SETS + path.crossings).w);
-        path.crossings += 1;
-    }
+    path.channel = sample_channel(left / sum, sample_set(tables, path, MASK_SETS + path.crossings).w);
+    path.crossings += 1;
 }
 
 /// The one of the BSDFs of a surface that acts at this vertex: by the side, or by chance.
@@ -305,6 +307,9 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     // The optical depth of the way through the medium since `t_min`.
     if medium.flight_share == 0.0 && tables.features.chromatic {
         pass_absorbing(tables, path, medium.sigma_t * end.dense);
+        if !path.alive {
+            return None;
+        }
     } else {
         path.tau_left -= end.dense * medium.flight_share * medium.sigma_t[path.channel as usize];
         if medium.flight_share < 1.0 {
