@@ -27,7 +27,8 @@ void main() {
     uvec2 place = uvec2(0u), origin = uvec2(0u);
     End first, second;
     vec3 weight = vec3(0.0);
-    float density = 0.0;
+    float density = 0.0, aimed = 1.0;
+    Aim aim = Aim(vec3(0.0), 0.0, 0.0);
     bool asked = false;
     Path path;
     path.shadow = true;
@@ -37,7 +38,7 @@ void main() {
     Walk walk = Walk(0u, 0u, 0u);
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {
-            vec4 found = asked ? end_connection(hit, second, weight, density) : vec4(0.0);
+            vec4 found = asked ? end_connection(hit, second, weight, density, aimed) : vec4(0.0);
             if (next > 0u) {
                 store_pair(pairs, own, to, found);
             }
@@ -64,6 +65,10 @@ void main() {
                 first.kind = all(lessThan(origin + place, size)) ? first.kind : END_NONE;
                 vec4 left = SAMPLE(record + 2u);
                 path.left = uint(left.x) | uint(left.y) << 16u;
+                if (HAS_EQUIANGULAR) {
+                    vec4 goes_by = SAMPLE(record + AIM);
+                    aim = Aim(goes_by.xyz, goes_by.w, 0.0);
+                }
                 if (HAS_CHROMATIC) {
                     weight = SAMPLE(record + RECORD_WEIGHT).xyz;
                 }
@@ -75,7 +80,7 @@ void main() {
             if (first.kind != END_NONE && all(lessThan(origin + other, size))) {
                 uint record = record_of(first_slot + (other.y * TILE + other.x) * count + of_pixel);
                 second = load_end(record + SECOND);
-                asked = second.kind != END_NONE && begin_connection(path, first, second, density);
+                asked = second.kind != END_NONE && begin_connection(path, first, second, aim, density, aimed);
                 if (asked) {
                     begin_ray(path, ray, grid, walk, hit);
                 }

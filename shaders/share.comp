@@ -42,7 +42,7 @@ void main() {
         vec4 densities[SHARERS];
         float of_place = 0.0;
         for (uint k = 0u; k < SHARERS; ++k) {
-            if (HAS_CHROMATIC) {
+            if (HAS_PAIR_VECTORS) {
                 densities[k] = SAMPLE(pairs + SHARERS * j + k);
             } else {
                 densities[k] = vec4(SAMPLE(pairs + SHARERS / 4u * j + k / 4u)[k % 4u]);
@@ -57,6 +57,8 @@ void main() {
                 bool turns = second.kind == END_MEDIUM;
                 float g = MEDIUM(second.medium).g;
                 float found = turns ? eval_henyey_greenstein(g, second.axis, sent.light_direction) : 1.0;
+                // Of the direction that the path took from there: densities by the aim and by scattering.
+                vec2 aimed = turns && HAS_EQUIANGULAR ? SAMPLE(record + 2u).zw : vec2(1.0, 0.0);
                 float of_path = 0.0;
                 float phases[SHARERS];
                 for (uint k = 0u; k < SHARERS; ++k) {
@@ -64,7 +66,7 @@ void main() {
                     if (turns && densities[k].w > 0.0) {
                         phases[k] = eval_henyey_greenstein(g, normalize(second.point - points[k]), sent.rest_direction);
                     }
-                    of_path += densities[k].w * phases[k];
+                    of_path += densities[k].w * (aimed.x * phases[k] + aimed.y);
                 }
                 vec3 ended = is_something(sent.ended) ? sent.ended / of_place : vec3(0.0);
                 vec3 light = is_something(sent.light) ? sent.light / (of_place * found) : vec3(0.0);

@@ -18,7 +18,6 @@
 
 use crate::pack::Packed;
 use crate::pack::layout::PILOT_CELLS;
-use crate::pack::lights::is_near;
 use crate::reference::bindings::Tables;
 use crate::reference::outlook::outlook_cell;
 use crate::reference::path::{arriving_throughput, path_answer_seen, path_start};
@@ -44,9 +43,6 @@ const CONNECTION_COST: f64 = 0.45;
 pub const MOST_SHARERS: u32 = 8;
 /// Pixels share their paths if the pilot promises at most this much of the variance times time without.
 const WORTH_SHARING: f64 = 0.8;
-
-/// Area of a broad lamp over the square of the scene's diameter.
-const BROAD_AREA: f32 = 2e-3;
 
 /// Films with fewer pixels are rendered before a pilot would be.
 const LEAST_PIXELS: usize = 4096;
@@ -144,18 +140,10 @@ fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
     }
 }
 
-/// Whether the kernels can connect paths of different pixels in such a scene, and do it well: light through voxels, masks and panes is known
-/// by chance only; and what goes by small lamps in fog must do so at all its vertices.
+/// Whether the kernels can connect paths of different pixels in such a scene: light through voxels, masks and panes is known by chance only.
 pub fn can_share_paths(packed: &Packed) -> bool {
     let features = &packed.features;
-    let spread = !features.equiangular || has_broad_lamps_only(packed);
-    features.light_sampling && spread && !features.grids && !features.masks && !features.panes
-}
-
-/// Whether all lamps are so broad that light does not come from near them alone.
-fn has_broad_lamps_only(packed: &Packed) -> bool {
-    let least = BROAD_AREA * (2.0 * packed.frame.radius as f32).powi(2);
-    packed.lights.iter().filter(|light| is_near(light)).all(|light| light.area > least)
+    features.light_sampling && !features.grids && !features.masks && !features.panes
 }
 
 /// Follows one path for each block, and again until there are enough. The order of the result does not depend on the threads.

@@ -97,7 +97,7 @@ const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("path_lights", &["path_state", "path_vertex", "path_aim", "light", "sky", "grid", "texture"]),
     ("path_flight", &["path_state", "path_aim", "equiangular", "ray", "light", "grid"]),
     ("path_rays", &["path_state", "path_surface", "path_flight", "ray"]),
-    ("path_share", &["path_state", "path_vertex", "path_rays"]),
+    ("path_share", &["path_state", "path_vertex", "path_rays", "path_aim"]),
     ("path_walk", &["path_rays", "bvh"]),
     (
         "path",

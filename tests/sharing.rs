@@ -9,7 +9,7 @@ use glam::DVec3;
 use tyndall::gpu::shader::Variant;
 use tyndall::pack::Packed;
 use tyndall::pilot;
-use tyndall::scene::{Film, Integrator, Medium, ReconstructionFilter, Scene, Shape};
+use tyndall::scene::{Film, Integrator, Light, Medium, ReconstructionFilter, Scene, Shape};
 
 const SIDE: u32 = 64;
 
@@ -32,7 +32,26 @@ fn cases(side: u32) -> Vec<(&'static str, Scene)> {
         scene.media[0] = scenes::gray(2.0, albedo, 0.6);
         scene
     };
+    // A lamp that both ways to light find, seen through a pane of haze: neighbours meet the same vertex from far different directions.
+    let mut glare = Scene::new(scenes::camera(4.0), Film::new(side, side));
+    let haze = glare.add_medium(scenes::gray(20.0, 1.0, 0.9));
+    let pane = glam::DMat4::from_scale(v(1.5, 1.5, 0.05));
+    glare.shapes.push(Shape::boundary("pane", scenes::cuboid(pane), haze));
+    let behind = scenes::quad(v(-1.0, -1.0, -0.5), DVec3::X * 2.0, DVec3::Y * 2.0);
+    glare.shapes.push(Shape::lamp("lamp", behind, v(1.0, 2.0, 3.0)));
+    glare.integrator.max_depth = Some(6);
+    // A lamp that is small, and near to what is seen.
+    let mut lantern = Scene::new(scenes::camera(4.0), Film::new(side, side));
+    let fog = lantern.add_medium(scenes::gray(0.2, 0.9, 0.6));
+    lantern.camera.medium = Some(fog);
+    let floor = scenes::quad(v(-3.0, -1.0, 3.0), DVec3::X * 6.0, DVec3::NEG_Z * 6.0);
+    lantern.shapes.push(Shape::diffuse("floor", floor, DVec3::splat(0.5)));
+    let small = scenes::quad(v(0.3, 0.2, 0.0), DVec3::X * 0.1, DVec3::Z * 0.1);
+    lantern.shapes.push(Shape::lamp("lamp", small, v(90.0, 80.0, 70.0)));
+    lantern.lights.push(Light::Constant { radiance: v(0.1, 0.2, 0.3) });
     cases.extend([
+        ("glare", glare),
+        ("lantern", lantern),
         ("wide filter", wide),
         ("eager roulette", eager),
         ("absorbing", absorbing(v(2.0, 2.0, 2.0))),
@@ -114,8 +133,10 @@ fn sharing_changes_no_expectation() {
             continue;
         }
         let sharers = [4, 8][index / 2 % 2];
-        let truth = tiles(&images::on_device(&pack(&scene, 4), 24));
-        let image = tiles(&images::reconstructed(&shared(&pack(&scene, 5), sharers), SIDE, 24));
+        // Two that take more samples to tell right from wrong.
+        let samples = if matches!(name, "glare" | "lantern") { 256 } else { 24 };
+        let truth = tiles(&images::on_device(&pack(&scene, 4), samples));
+        let image = tiles(&images::reconstructed(&shared(&pack(&scene, 5), sharers), SIDE, samples));
         let (z, coarsest) = differences(&image, &truth);
         eprintln!("{name}, {sharers}: z = {z:.2?}, standard errors below {:.2} %", coarsest * 100.0);
         assert!(z.iter().all(|z| z.abs() < 4.0), "{name}: z = {z:?}");

@@ -124,7 +124,13 @@ void scatter(inout Path path, Vertex vertex) {
     vec4 u = sample_vertex(path);
     float lobe = HAS_LOBES || HAS_PHASES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
     Aim aim = find_aim(path, vertex);
-    BsdfSample next = sample_next(vertex, aim, u.zw, lobe, path.scattered_pdf);
+    float scattered;
+    BsdfSample next = sample_next(vertex, aim, u.zw, lobe, scattered);
+    if (HAS_SHARING && HAS_EQUIANGULAR) {
+        share_aim(path, vertex, aim, next, scattered);
+    }
+    path.scattered_pdf = weighing_pdf(path, vertex, scattered);
+    float pdf = is_common(path, vertex) ? aimed_pdf(aim, path.scattered_pdf, next.direction) : next.pdf;
     path.point = vertex.point;
     path.t_min = 0.0;
     path.last = NONE;
@@ -143,7 +149,7 @@ void scatter(inout Path path, Vertex vertex) {
         path.collisions = 0u;
     }
     path.throughput *= next.weight;
-    path.pdf = sealed ? 0.0 : next.pdf; // light that scattering finds counts in full
+    path.pdf = sealed ? 0.0 : pdf; // light that scattering finds counts in full
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
     if (!is_finite(path.throughput)) {

@@ -33,9 +33,7 @@ vec3 light_pivot(Light light, vec2 u) {
 Aim find_aim(Path path, Vertex vertex) {
     Aim aim = Aim(vec3(0.0, 0.0, 1.0), 0.0, 0.0);
     bool may = vertex.in_medium || !HAS_DIELECTRIC || (vertex.surface.flags & SURFACE_ORIENTED) == 0u;
-    // Nor where others take part in the direction's density: see lib/path_share.glsl.
-    bool connects = HAS_SHARING && (path.sharing == 1u && path.depth == 1u || path.sharing == 2u && path.depth == 2u && vertex.in_medium);
-    if (HAS_EQUIANGULAR && may && !connects && MEDIUM(valid_medium(path.medium)).equiangular > 0.0) {
+    if (HAS_EQUIANGULAR && may && MEDIUM(valid_medium(path.medium)).equiangular > 0.0) {
         // The next segment's numbers: its distances go by the same point.
         vec4 v = sample_set(path, PIVOT_SET + path.segment + 1u);
         Light light = LIGHT(choose_light(v.x));
@@ -51,6 +49,17 @@ Aim find_aim(Path path, Vertex vertex) {
 // Density of a direction that scattering has with the density `pdf`, by both ways to choose it.
 float aimed_pdf(Aim aim, float pdf, vec3 direction) {
     return HAS_EQUIANGULAR && aim.share > 0.0 ? mix(pdf, toward_light_pdf(aim.axis, direction), aim.share) : pdf;
+}
+
+// Whether it is the vertex of a medium that others scatter at as well, each of them from where it comes: lib/path_share.glsl.
+bool is_common(Path path, Vertex vertex) {
+    return HAS_SHARING && HAS_HENYEY_GREENSTEIN && path.sharing == 2u && path.depth == 2u && vertex.in_medium;
+}
+
+// The density of scattering that the weights of multiple importance sampling go by. Any will do that the two ways to a light agree on; at
+// a common vertex all paths must, wherever they come from.
+float weighing_pdf(Path path, Vertex vertex, float scattered) {
+    return is_common(path, vertex) ? INV_4PI : scattered;
 }
 
 // The next direction: by the one-sample model of multiple importance sampling (Veach and Guibas 1995), with the balance heuristic.

@@ -155,7 +155,7 @@ bool sample_light(inout Path path, Vertex vertex, Aim aim, vec2 u, vec2 decision
         // transmittance, exact instead of 0 or 1.
         BsdfSample scattered = sample_scattering(vertex, u, decision.x);
         vec3 weight = scattered.pdf > 0.0 ? light.radiance / scattered.pdf : vec3(0.0);
-        found = LightSample(scattered.direction, INFINITE_DISTANCE, weight, scattered.pdf);
+        found = LightSample(scattered.direction, INFINITE_DISTANCE, weight, weighing_pdf(path, vertex, scattered.pdf));
     } else if (HAS_VOLUME_LIGHTS && light.kind == LIGHT_VOLUME) {
         found = sample_volume_light(light, vertex.point, u, sample_set(path, EMISSION_SETS + path.segment).y);
     } else if (HAS_POINT_LIGHTS && light.kind == LIGHT_POINT) {
@@ -184,7 +184,8 @@ bool sample_light(inout Path path, Vertex vertex, Aim aim, vec2 u, vec2 decision
     path.light = index;
     path.light_channels = path.throughput * scattering.value;
     path.light_weight = path.light_channels * found.weight / light.probability;
-    path.pdf_ratio = HAS_MIS && found.pdf > 0.0 ? aimed_pdf(aim, scattering.pdf, found.direction) / (found.pdf * light.probability) : 0.0;
+    float pdf = aimed_pdf(aim, weighing_pdf(path, vertex, scattering.pdf), found.direction);
+    path.pdf_ratio = HAS_MIS && found.pdf > 0.0 ? pdf / (found.pdf * light.probability) : 0.0;
     path.light_medium = medium_towards(vertex, path.medium, found.direction);
     path.origin = offset_origin(path, found.direction);
     return max_component(path.light_weight) > 0.0 || !is_finite(path.light_weight);

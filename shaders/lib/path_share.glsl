@@ -14,16 +14,19 @@
 #include "lib/path_state.glsl"
 #include "lib/path_vertex.glsl"
 #include "lib/path_rays.glsl"
+#include "lib/path_aim.glsl"
 
 // What the vertex of a path is for others.
 const uint END_NONE = 0u;
 const uint END_SURFACE = 1u;
 const uint END_MEDIUM = 2u;
 
-// The RECORD_VECTORS of a record: the first vertex in two, what its rays need, its weight; and then from here on:
+// The RECORD_VECTORS of a record: the first vertex in two; the triangle that its rays leave, and what the second vertex's direction went by;
+// the first one's weight; and then from here on:
 const uint SECOND = 4u; // the second vertex
 const uint SENT = 6u;   // what it sends: see Sent
 const uint BASE = 11u;  // radiance that came before it
+const uint AIM = 12u;   // what the first vertex's direction went by: the direction to a lamp, and its share
 
 const uvec2 SHARE_SIZE = uvec2(2u, SHARERS == 4u ? 2u : 4u);
 
@@ -62,14 +65,17 @@ uint record_of(uint slot) {
     return push.work.first_record + RECORD_VECTORS * slot;
 }
 
+// Whether what a connection brings and its density are not one and the same number.
+const bool HAS_PAIR_VECTORS = HAS_CHROMATIC || HAS_EQUIANGULAR;
+
 // Where the densities of a group's connections begin. `number` is that of the group, times samples.
 uint pairs_of(uint number) {
-    return push.work.first_pair + SHARERS * (HAS_CHROMATIC ? SHARERS : SHARERS / 4u) * number;
+    return push.work.first_pair + SHARERS * (HAS_PAIR_VECTORS ? SHARERS : SHARERS / 4u) * number;
 }
 
-// The density of the second vertex of j by the first of i: of each channel, and as the flight of i chooses one.
+// What reaches the first vertex of i from the second of j in each channel, and the density with which it finds that.
 void store_pair(uint pairs, uint i, uint j, vec4 density) {
-    if (HAS_CHROMATIC) {
+    if (HAS_PAIR_VECTORS) {
         store_sample(pairs + SHARERS * j + i, density);
     } else {
         SAMPLE(pairs + SHARERS / 4u * j + i / 4u)[i % 4u] = density.w;
@@ -119,7 +125,7 @@ void share_vertex(inout Path path, inout Vertex vertex) {
         vec3 weight = path.throughput * (vertex.in_medium ? vertex.albedo : vertex.surface.reflectance);
         if (max_component(weight) > 0.0) {
             store_end(record, path, vertex);
-            store_sample(record + 2u, vec4(float(path.left & 0xffffu), float(path.left >> 16u), 0.0, 0.0));
+            store_sample(record + 2u, vec4(float(path.left & 0xffffu), float(path.left >> 16u), 1.0, 0.0));
             store_sample(record + RECORD_WEIGHT, vec4(weight, 0.0));
             path.sharing = 1u;
         }
@@ -133,6 +139,20 @@ void share_vertex(inout Path path, inout Vertex vertex) {
         path.before /= max(path.throughput, vec3(1e-30));
         vertex.albedo = vertex.in_medium ? MEDIUM(valid_medium(path.medium)).albedo : vertex.albedo;
         path.sharing = 2u;
+    }
+}
+
+// Keeps what the directions of the first two vertices went by. At a second one in a medium it takes part in the density of each path that
+// may come there, so the path goes on as if scattering alone had chosen its direction, which has the density `scattered`.
+void share_aim(inout Path path, Vertex vertex, Aim aim, inout BsdfSample next, float scattered) {
+    uint record = record_of(path.slot);
+    if (path.sharing == 1u && path.depth == 1u) {
+        store_sample(record + AIM, vec4(aim.axis, aim.share));
+    } else if (is_common(path, vertex) && aim.share > 0.0 && scattered > 0.0) {
+        SAMPLE(record + 2u).zw = vec2(1.0 - aim.share, aimed_pdf(aim, 0.0, next.direction));
+        float ratio = scattered / next.pdf;
+        next.weight /= ratio;
+        path.before *= ratio;
     }
 }
 
@@ -167,8 +187,8 @@ Sent load_sent(uint record) {
 }
 
 // Asks for the ray from a first vertex to a second one. Returns whether the first could have found the second: `density` is that of the
-// place, without what lies on the way.
-bool begin_connection(inout Path path, End first, End second, out float density) {
+// place by scattering, without what lies on the way, and `aimed` the density with the first vertex's aim over that.
+bool begin_connection(inout Path path, End first, End second, Aim aim, out float density, out float aimed) {
     vec3 way = second.point - first.point;
     vec3 begin = first.point, end = second.point;
     if (first.kind == END_SURFACE) {
@@ -195,13 +215,14 @@ bool begin_connection(inout Path path, End first, End second, out float density)
     } else {
         density = HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(MEDIUM(first.medium).g, first.axis, path.direction) : INV_4PI;
     }
+    aimed = aimed_pdf(aim, density, path.direction) / density;
     density *= second.kind == END_SURFACE ? max(-dot(second.axis, path.direction), 0.0) : 1.0;
     density /= far * far;
     return far > 0.0 && density > 0.0;
 }
 
-// The density of a connection whose ray has been traced, of each channel, and for the flight of the first vertex, which chooses one.
-vec4 end_connection(Hit hit, End second, vec3 weight, float density) {
+// What a connection whose ray has been traced brings in each channel, and its density by the flight of the first vertex, which chooses one.
+vec4 end_connection(Hit hit, End second, vec3 weight, float density, float aimed) {
     if (hit.blocked) {
         return vec4(0.0);
     }
@@ -210,7 +231,7 @@ vec4 end_connection(Hit hit, End second, vec3 weight, float density) {
         passes *= HAS_CHROMATIC ? exp_minus(max(hit.tau_rgb, vec3(0.0))) : vec3(exp_minus(max(hit.tau, 0.0)));
         passes *= second.kind == END_MEDIUM ? MEDIUM(second.medium).sigma_t : vec3(1.0);
     }
-    return vec4(passes, HAS_CHROMATIC ? dot(channel_weights(weight), passes) : passes.x);
+    return vec4(passes, aimed * (HAS_CHROMATIC ? dot(channel_weights(weight), passes) : passes.x));
 }
 
 // The phase function of the second vertex for light from `from`.

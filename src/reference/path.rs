@@ -9,14 +9,14 @@ use super::filter::sample_filter;
 use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
 use super::medium::{channel_weights, sample_channel};
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
-use super::path_aim::{find_aim, sample_next};
+use super::path_aim::{aimed_pdf, find_aim, is_common, sample_next, weighing_pdf};
 use super::path_flight::{
     albedo_factor, end_flight, end_height_flight, end_voxel_flight, enter_medium, flight_point, flight_side, free_way,
     near_distance, pass_medium, rare_collision_weight, rare_passage_weight,
 };
 use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
-use super::path_share::{share_ended, share_light, share_vertex};
+use super::path_share::{share_aim, share_ended, share_light, share_vertex};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
     INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_camera, sample_lens, sample_set, sample_vertex,
@@ -140,8 +140,10 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     let u = sample_vertex(tables, path);
     let lobe = sample_set(tables, path, 2 * path.segment + 2).y;
     let aim = find_aim(tables, path, vertex);
-    let (next, scattered) = sample_next(tables, vertex, &aim, u.zw(), lobe);
-    path.scattered_pdf = scattered;
+    let (mut next, scattered) = sample_next(tables, vertex, &aim, u.zw(), lobe);
+    share_aim(path, vertex, &aim, &mut next, scattered);
+    path.scattered_pdf = weighing_pdf(path, vertex, scattered);
+    let pdf = if is_common(path, vertex) { aimed_pdf(&aim, path.scattered_pdf, next.direction) } else { next.pdf };
     path.point = vertex.point;
     path.t_min = 0.0;
     path.last = NONE;
@@ -160,7 +162,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
         path.collisions = 0;
     }
     path.throughput *= next.weight;
-    path.pdf = if sealed { 0.0 } else { next.pdf };
+    path.pdf = if sealed { 0.0 } else { pdf };
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
     if !path.throughput.is_finite() {

@@ -8,6 +8,7 @@ use super::path_vertex::{Vertex, eval_scattering, sample_scattering};
 use super::toward_light::{sample_toward_light, toward_light_pdf};
 use crate::pack::layout::{LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_TRIANGLE, SURFACE_ORIENTED};
 use glam::{DVec2, DVec3, Vec4Swizzles};
+use std::f64::consts::PI;
 
 /// Sets of random numbers that choose what a segment's sampling goes by: its direction, and then equiangular distances.
 pub const PIVOT_SET: u32 = 0x4000_0000;
@@ -18,12 +19,12 @@ const AIMED_SHARE: f64 = 0.25;
 const BROAD: f64 = 8.0;
 
 /// What a vertex's next direction goes by.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Aim {
     /// To a point of the lamp.
-    axis: DVec3,
+    pub axis: DVec3,
     /// Probability of directions by the lamp; 0 where only scattering counts.
-    share: f64,
+    pub share: f64,
     /// Decides between the two.
     u: f64,
 }
@@ -40,9 +41,7 @@ pub fn light_pivot(light: &Light, u: DVec2) -> DVec3 {
 pub fn find_aim(tables: &Tables, path: &Path, vertex: &Vertex) -> Aim {
     let mut aim = Aim { axis: DVec3::Z, share: 0.0, u: 0.0 };
     let may = vertex.in_medium || vertex.surface.flags & SURFACE_ORIENTED == 0;
-    let second = path.sharing == 2 && path.depth == 2 && vertex.in_medium;
-    let shared = path.sharing == 1 && path.depth == 1 || second;
-    if may && !shared && medium_at(tables, path.medium).equiangular > 0.0 {
+    if may && medium_at(tables, path.medium).equiangular > 0.0 {
         let mut v = sample_set(tables, path, PIVOT_SET + path.segment + 1);
         let light = &tables.lights[choose_light(tables, &mut v.x) as usize];
         let way = light_pivot(light, v.zw()) - vertex.point;
@@ -58,6 +57,16 @@ pub fn find_aim(tables: &Tables, path: &Path, vertex: &Vertex) -> Aim {
 /// Density of a direction that scattering has with the density `pdf`, by both ways to choose it.
 pub fn aimed_pdf(aim: &Aim, pdf: f64, direction: DVec3) -> f64 {
     if aim.share > 0.0 { (1.0 - aim.share) * pdf + aim.share * toward_light_pdf(aim.axis, direction) } else { pdf }
+}
+
+/// Whether it is the vertex of a medium that others scatter at as well, each of them from where it comes.
+pub fn is_common(path: &Path, vertex: &Vertex) -> bool {
+    path.sharing == 2 && path.depth == 2 && vertex.in_medium
+}
+
+/// The density of scattering that the weights of multiple importance sampling go by; at a common vertex one on which all paths agree.
+pub fn weighing_pdf(path: &Path, vertex: &Vertex, scattered: f64) -> f64 {
+    if is_common(path, vertex) { 0.25 / PI } else { scattered }
 }
 
 /// The next direction, and its density by scattering alone.

@@ -10,7 +10,7 @@ use super::light::{
 };
 use super::math::max_component;
 use super::medium::{channel_weights, emitting_length, emitting_length_rgb, survival_weight};
-use super::path_aim::{Aim, aimed_pdf};
+use super::path_aim::{Aim, aimed_pdf, weighing_pdf};
 use super::path_state::{
     EMISSION_SETS, INFINITE_DISTANCE, Path, choose_light, sample_set, survival, survived_throughput,
 };
@@ -179,7 +179,7 @@ pub fn sample_light(
             // the transmittance, exact instead of 0 or 1.
             let BsdfSample { direction, pdf, .. } = sample_scattering(tables, vertex, u, decision.x);
             let weight = if pdf > 0.0 { light.radiance / pdf } else { DVec3::ZERO };
-            LightSample { direction, distance: INFINITE_DISTANCE, weight, pdf }
+            LightSample { direction, distance: INFINITE_DISTANCE, weight, pdf: weighing_pdf(path, vertex, pdf) }
         }
         LIGHT_VOLUME => {
             let u_distance = sample_set(tables, path, EMISSION_SETS + path.segment).y;
@@ -210,7 +210,7 @@ pub fn sample_light(
     path.light = index;
     path.light_channels = path.throughput * scattering.value;
     path.light_weight = path.light_channels * weight / light.probability;
-    let pdf = aimed_pdf(aim, scattering.pdf, found.direction);
+    let pdf = aimed_pdf(aim, weighing_pdf(path, vertex, scattering.pdf), found.direction);
     path.pdf_ratio = if tables.features.mis && found.pdf > 0.0 { pdf / (found.pdf * light.probability) } else { 0.0 };
     path.light_medium = medium_towards(tables, vertex, path.medium, found.direction);
     path.origin = offset_origin(path, found.direction);

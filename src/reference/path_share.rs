@@ -2,8 +2,10 @@
 //! pixel stays, is told there. `connect.comp` and `share.comp` are [`share`] here.
 
 use super::bindings::Tables;
+use super::bsdf::BsdfSample;
 use super::math::{exp_minus_rgb, max_component};
 use super::medium::channel_weights;
+use super::path_aim::{Aim, aimed_pdf, is_common};
 use super::path_state::{Hit, NONE, Path, medium_at};
 use super::path_vertex::Vertex;
 use super::phase::eval_henyey_greenstein;
@@ -48,6 +50,8 @@ pub struct Record {
     pub first: End,
     /// The triangle on which it lies, which its rays cannot meet again.
     pub left: u32,
+    /// What its direction went by.
+    pub aim: Aim,
     /// What the radiance that it scatters is multiplied with.
     pub weight: DVec3,
     /// The second vertex.
@@ -64,6 +68,10 @@ pub struct Record {
     pub rest: DVec3,
     /// From where that comes.
     pub rest_direction: DVec3,
+    /// Where the second vertex scatters in a medium: the probability that it does without an aim, and the density of that direction by it.
+    pub unaimed: f64,
+    /// The density of that direction by the aim, times its probability.
+    pub aimed: f64,
 }
 
 /// Whether a vertex scatters in a way that is known without its place on a surface.
@@ -89,6 +97,7 @@ pub fn share_vertex(tables: &Tables, path: &mut Path, vertex: &mut Vertex) {
             path.record.first = end_of(path, vertex);
             path.record.left = path.left;
             path.record.weight = weight;
+            path.record.unaimed = 1.0;
             path.sharing = 1;
         }
     } else if path.depth == 1 && path.sharing == 1 && can_share(path, vertex) {
@@ -103,6 +112,20 @@ pub fn share_vertex(tables: &Tables, path: &mut Path, vertex: &mut Vertex) {
             vertex.albedo = medium_at(tables, path.medium).albedo;
         }
         path.sharing = 2;
+    }
+}
+
+/// Keeps what the directions of the first two vertices went by. After a second one in a medium the path goes on as if scattering alone
+/// had chosen its direction, which has the density `scattered`.
+pub fn share_aim(path: &mut Path, vertex: &Vertex, aim: &Aim, next: &mut BsdfSample, scattered: f64) {
+    if path.sharing == 1 && path.depth == 1 {
+        path.record.aim = *aim;
+    } else if is_common(path, vertex) && aim.share > 0.0 && scattered > 0.0 {
+        path.record.unaimed = 1.0 - aim.share;
+        path.record.aimed = aimed_pdf(aim, 0.0, next.direction);
+        let ratio = scattered / next.pdf;
+        next.weight /= ratio;
+        path.before *= ratio;
     }
 }
 
@@ -126,9 +149,9 @@ pub fn share_rest(path: &mut Path) -> DVec3 {
     DVec3::ZERO
 }
 
-/// The ray from a first vertex to a second one, and the density of the place without what lies on the way; none if the first could
-/// not have found the second.
-fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(Path, f64)> {
+/// The ray from a first vertex to a second one, the density of the place by scattering without what lies on the way, and that with the
+/// first vertex's aim over it; none if the first could not have found the second.
+fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(Path, f64, f64)> {
     let first = &record.first;
     let way = second.point - first.point;
     let (mut begin, mut end) = (first.point, second.point);
@@ -146,6 +169,7 @@ fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(P
         Kind::Surface => first.axis.dot(direction).max(0.0) / PI,
         _ => eval_henyey_greenstein(medium_at(tables, first.medium).g, first.axis, direction),
     };
+    let aimed = aimed_pdf(&record.aim, density, direction) / density;
     density *= if second.kind == Kind::Surface { (-second.axis.dot(direction)).max(0.0) } else { 1.0 };
     density /= far * far;
     let path = Path {
@@ -162,11 +186,11 @@ fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(P
         shadow: true,
         ..Path::default()
     };
-    (far > 0.0 && density > 0.0).then_some((path, density))
+    (far > 0.0 && density > 0.0).then_some((path, density, aimed))
 }
 
-/// The density of a connection in each channel, and as the flight of the first vertex chooses one.
-fn end_connection(tables: &Tables, hit: &Hit, second: &End, weight: DVec3, density: f64) -> (DVec3, f64) {
+/// What a connection brings in each channel, and its density as the flight of the first vertex chooses one.
+fn end_connection(tables: &Tables, hit: &Hit, second: &End, from: &Record, density: f64, aimed: f64) -> (DVec3, f64) {
     if hit.blocked {
         return (DVec3::ZERO, 0.0);
     }
@@ -174,16 +198,16 @@ fn end_connection(tables: &Tables, hit: &Hit, second: &End, weight: DVec3, densi
     if second.kind == Kind::Medium {
         passes *= medium_at(tables, second.medium).sigma_t;
     }
-    (passes, channel_weights(weight).dot(passes))
+    (passes, aimed * channel_weights(from.weight).dot(passes))
 }
 
-/// Densities of the second vertex of `to` by the first of `from`.
+/// What the second vertex of `to` brings to the first of `from`, and its density by that.
 fn connect(tables: &Tables, from: &Record, to: &Record) -> (DVec3, f64) {
     if from.first.kind == Kind::None || to.second.kind == Kind::None {
         return (DVec3::ZERO, 0.0);
     }
-    let Some((path, density)) = begin_connection(tables, from, &to.second) else { return (DVec3::ZERO, 0.0) };
-    end_connection(tables, &super::traverse(tables, &path), &to.second, from.weight, density)
+    let Some((path, density, aimed)) = begin_connection(tables, from, &to.second) else { return (DVec3::ZERO, 0.0) };
+    end_connection(tables, &super::traverse(tables, &path), &to.second, from, density, aimed)
 }
 
 /// The phase function of a second vertex for light that arrives along `axis`; 1 on a surface, which scatters alike to all sides.
@@ -210,7 +234,8 @@ pub fn share(tables: &Tables, records: &[Record]) -> Vec<DVec3> {
         let phases: Vec<f64> = (records.iter().zip(&densities))
             .map(|(from, (_, density))| if *density > 0.0 { towards(from, to.rest_direction) } else { 0.0 })
             .collect();
-        let of_path: f64 = densities.iter().zip(&phases).map(|((_, density), phase)| density * phase).sum();
+        let by_aim = |phase: f64| if to.second.kind == Kind::Medium { to.unaimed * phase + to.aimed } else { phase };
+        let of_path: f64 = densities.iter().zip(&phases).map(|((_, density), phase)| density * by_aim(*phase)).sum();
         let unless_zero = |v: DVec3, by: f64| if v == DVec3::ZERO { v } else { v / by };
         let ended = unless_zero(to.ended, of_place);
         let light = unless_zero(to.light, of_place * found);
