@@ -46,8 +46,10 @@ const WORTH_SHARING: f64 = 0.8;
 
 /// Films with fewer pixels are rendered before a pilot would be.
 const LEAST_PIXELS: usize = 4096;
-/// Paths that may not get deeper than this are short anyway.
+/// Paths that may not get deeper than this are short anyway: no pilot ends them.
 const LEAST_MAX_DEPTH: u32 = 8;
+/// The least depth with light behind second vertices.
+const LEAST_SHARED_DEPTH: u32 = 3;
 /// Scenes with more primitives are not copied for a pilot.
 const MOST_PRIMITIVES: usize = 4_000_000;
 /// The film is divided into blocks of pixels, at most this many on a side.
@@ -115,11 +117,11 @@ struct Blocks {
 /// gain nothing by it stay as they are.
 pub fn run(packed: &mut Packed, sharing: bool) {
     let features = &packed.features;
-    let large = packed.pixel_count() >= LEAST_PIXELS && features.max_depth >= LEAST_MAX_DEPTH;
+    let large = packed.pixel_count() >= LEAST_PIXELS;
     // Without a tree rays are so cheap that shorter paths hardly pay for the noise of their ends.
     // Light that comes through glass comes in rare, bright paths, of which a pilot has seen too few.
-    let roulette = features.tree && !features.dielectric;
-    let sharing = sharing && can_share_paths(packed);
+    let roulette = features.tree && !features.dielectric && features.max_depth >= LEAST_MAX_DEPTH;
+    let sharing = sharing && features.max_depth >= LEAST_SHARED_DEPTH && can_share_paths(packed);
     if large && (roulette || sharing) && packed.primitives.len() <= MOST_PRIMITIVES {
         look_ahead(packed, sharing, roulette);
     }

@@ -39,11 +39,12 @@ fn samples_that_are_not_numbers_are_counted() {
 
 #[test]
 fn more_features_than_needed_do_not_change_the_image() {
+    // With all primitives in the tree the kernel that has everything is one and the same, for all scenes of one depth.
     for (name, scene) in scenes::all() {
-        let packed = scenes::pack(&scene, 8);
+        let packed = scenes::pack(&scene, 8).with_immediates(0);
         let variant = |features| Variant {
             features,
-            immediates: packed.immediates().to_vec(),
+            immediates: Vec::new(),
             workgroup: device().subgroup_size,
             buffer_reference: device().buffer_reference,
         };

@@ -154,6 +154,15 @@ fn a_pilot_shares_where_it_pays() {
     let mut alone = pack(&cases(SIDE)[0].1, 3);
     pilot::run(&mut alone, false);
     assert_eq!(alone.features.sharers, 0);
+    // Where paths are short as well, but for those without a second vertex that scatters.
+    for (max_depth, shares) in [(3, true), (2, false)] {
+        let mut short = cases(SIDE)[0].1.clone();
+        short.integrator.max_depth = Some(max_depth);
+        let mut packed = pack(&short, 3);
+        pilot::run(&mut packed, true);
+        assert_eq!(packed.features.sharers > 0, shares, "paths of at most {max_depth} segments");
+        assert!(!packed.features.pilot);
+    }
     // A floor under a lamp: light that is scattered twice is rare.
     let mut open = Scene::new(scenes::camera(4.0), Film::new(SIDE, SIDE));
     let floor = scenes::quad(v(-3.0, -1.0, 3.0), DVec3::X * 6.0, DVec3::NEG_Z * 6.0);

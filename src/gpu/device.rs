@@ -1,5 +1,6 @@
 //! Choosing a device and opening it.
 
+use super::pipeline::Pipelines;
 use super::{Error, check};
 use crate::render::DeviceInfo;
 use ash::{Entry, Instance, vk};
@@ -157,6 +158,7 @@ pub struct Device {
     pub(crate) raw: ash::Device,
     allocator: ManuallyDrop<Mutex<Allocator>>,
     queue: Mutex<vk::Queue>,
+    pub(crate) pipelines: Pipelines,
     pub(crate) queue_family: u32,
     /// Name and driver.
     pub info: DeviceInfo,
@@ -217,6 +219,7 @@ impl Device {
             raw,
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             queue: Mutex::new(queue),
+            pipelines: Pipelines::default(),
             queue_family: candidate.queue_family,
             info: candidate.description.info,
             subgroup_size: subgroups.subgroup_size.clamp(8, 128),
@@ -237,9 +240,10 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: buffers and kernels hold the device by Arc, so nothing of it is in use; the allocator goes before the device.
+        // SAFETY: buffers and kernels hold the device by Arc, so nothing of it is in use; pipelines and the allocator go before the device.
         unsafe {
             let _ = self.raw.device_wait_idle();
+            self.pipelines.clear();
             ManuallyDrop::drop(&mut self.allocator);
             self.raw.destroy_device(None);
         }

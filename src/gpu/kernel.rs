@@ -1,16 +1,16 @@
-//! A compute pipeline and how to run it.
+//! A kernel and how to run it.
 
 use super::buffer::Buffer;
+use super::pipeline::Pipeline;
 use super::{Device, Error, check};
 use ash::vk;
 use std::sync::Arc;
 
 /// A compiled kernel with `buffer_count` storage buffers at the bindings 0, 1, … of set 0, and push constants.
 pub struct Kernel {
+    // Dropped before the device.
+    pipeline: Arc<Pipeline>,
     device: Arc<Device>,
-    set_layout: vk::DescriptorSetLayout,
-    layout: vk::PipelineLayout,
-    pipeline: vk::Pipeline,
     pool: vk::DescriptorPool,
     set: vk::DescriptorSet,
     commands: vk::CommandPool,
@@ -20,14 +20,12 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Makes the pipeline. Drivers may put off their compilation to the first dispatch.
+    /// Makes the kernel, with a pipeline that the device still has or a new one. Drivers may put off its compilation to the first dispatch.
     pub fn new(device: &Arc<Device>, code: &[u32], buffer_count: u32, push_size: u32) -> Result<Kernel, Error> {
         // Handles are null until they are made, and destroying a null handle does nothing, so a failure half way leaks nothing.
         let mut kernel = Kernel {
+            pipeline: device.pipelines.get(&device.raw, code, buffer_count, push_size)?,
             device: device.clone(),
-            set_layout: vk::DescriptorSetLayout::null(),
-            layout: vk::PipelineLayout::null(),
-            pipeline: vk::Pipeline::null(),
             pool: vk::DescriptorPool::null(),
             set: vk::DescriptorSet::null(),
             commands: vk::CommandPool::null(),
@@ -35,50 +33,9 @@ impl Kernel {
             fence: vk::Fence::null(),
             buffer_count,
         };
-        kernel.make_pipeline(code, push_size)?;
         kernel.make_descriptors()?;
         kernel.make_commands()?;
         Ok(kernel)
-    }
-
-    fn make_pipeline(&mut self, code: &[u32], push_size: u32) -> Result<(), Error> {
-        let raw = &self.device.raw;
-        let bindings: Vec<vk::DescriptorSetLayoutBinding> = (0..self.buffer_count)
-            .map(|binding| {
-                vk::DescriptorSetLayoutBinding::default()
-                    .binding(binding)
-                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                    .descriptor_count(1)
-                    .stage_flags(vk::ShaderStageFlags::COMPUTE)
-            })
-            .collect();
-        let set_info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-        // SAFETY: here and below, the structures outlive the calls and the handles belong to this device.
-        self.set_layout =
-            check("vkCreateDescriptorSetLayout", unsafe { raw.create_descriptor_set_layout(&set_info, None) })?;
-        let range = vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(push_size);
-        let ranges = if push_size > 0 { std::slice::from_ref(&range) } else { &[] };
-        let set_layouts = [self.set_layout];
-        let layout_info =
-            vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(ranges);
-        // SAFETY: as above.
-        self.layout = check("vkCreatePipelineLayout", unsafe { raw.create_pipeline_layout(&layout_info, None) })?;
-        let module_info = vk::ShaderModuleCreateInfo::default().code(code);
-        // SAFETY: the code comes from glslang and is valid SPIR-V.
-        let module = check("vkCreateShaderModule", unsafe { raw.create_shader_module(&module_info, None) })?;
-        let stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(module)
-            .name(c"main");
-        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
-        // SAFETY: as above; the module is no longer needed once the pipeline exists.
-        let pipelines = unsafe {
-            let result = raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None);
-            raw.destroy_shader_module(module, None);
-            result
-        };
-        self.pipeline = check("vkCreateComputePipelines", pipelines.map_err(|(_, result)| result))?[0];
-        Ok(())
     }
 
     fn make_descriptors(&mut self) -> Result<(), Error> {
@@ -87,9 +44,9 @@ impl Kernel {
             .ty(vk::DescriptorType::STORAGE_BUFFER)
             .descriptor_count(self.buffer_count.max(1))];
         let pool_info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
-        // SAFETY: as in `make_pipeline`.
+        // SAFETY: here and below, the structures outlive the calls and the handles belong to this device.
         self.pool = check("vkCreateDescriptorPool", unsafe { raw.create_descriptor_pool(&pool_info, None) })?;
-        let layouts = [self.set_layout];
+        let layouts = [self.pipeline.set_layout];
         let set_info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&layouts);
         // SAFETY: as above.
         self.set = check("vkAllocateDescriptorSets", unsafe { raw.allocate_descriptor_sets(&set_info) })?[0];
@@ -101,7 +58,7 @@ impl Kernel {
         let pool_info = vk::CommandPoolCreateInfo::default()
             .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER)
             .queue_family_index(self.device.queue_family);
-        // SAFETY: as in `make_pipeline`.
+        // SAFETY: as above.
         self.commands = check("vkCreateCommandPool", unsafe { raw.create_command_pool(&pool_info, None) })?;
         let info = vk::CommandBufferAllocateInfo::default().command_pool(self.commands).command_buffer_count(1);
         // SAFETY: as above.
@@ -145,17 +102,17 @@ impl Kernel {
         unsafe {
             raw.update_descriptor_sets(&writes, &[]);
             check("vkBeginCommandBuffer", raw.begin_command_buffer(self.command, &begin))?;
-            raw.cmd_bind_pipeline(self.command, vk::PipelineBindPoint::COMPUTE, self.pipeline);
+            raw.cmd_bind_pipeline(self.command, vk::PipelineBindPoint::COMPUTE, self.pipeline.pipeline);
             raw.cmd_bind_descriptor_sets(
                 self.command,
                 vk::PipelineBindPoint::COMPUTE,
-                self.layout,
+                self.pipeline.layout,
                 0,
                 &[self.set],
                 &[],
             );
             if !push.is_empty() {
-                raw.cmd_push_constants(self.command, self.layout, vk::ShaderStageFlags::COMPUTE, 0, push);
+                raw.cmd_push_constants(self.command, self.pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, push);
             }
             raw.cmd_dispatch(self.command, groups, 1, 1);
             raw.cmd_pipeline_barrier(
@@ -183,9 +140,6 @@ impl Drop for Kernel {
             raw.destroy_fence(self.fence, None);
             raw.destroy_command_pool(self.commands, None);
             raw.destroy_descriptor_pool(self.pool, None);
-            raw.destroy_pipeline(self.pipeline, None);
-            raw.destroy_pipeline_layout(self.layout, None);
-            raw.destroy_descriptor_set_layout(self.set_layout, None);
         }
     }
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 pub mod buffer;
 pub mod device;
 pub mod kernel;
+mod pipeline;
 pub mod renderer;
 pub mod shader;
 
