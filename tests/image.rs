@@ -257,6 +257,25 @@ fn trimming_drops_the_worst_hundredth() {
 }
 
 #[test]
+fn z_knows_noise_that_neighbours_have_in_common() {
+    // Blocks of 8 × 8 pixels have one noise: the error of the mean is eight times that of as many independent pixels.
+    let side = 128;
+    let blocks = |seed: usize| gray(side, side, move |i| noise(seed * 4096 + i / side / 8 * 16 + i % side / 8));
+    let single = |seed: usize| gray(side, side, move |i| noise(seed * 65536 + i));
+    let flat = gray(side, side, |_| 0.5);
+    let spread = |image: &dyn Fn(usize) -> Image| {
+        let z = (1..40).map(|seed| compare(&image(seed), &flat).unwrap().mean.z.powi(2));
+        (z.sum::<f64>() / 39.0).sqrt()
+    };
+    // Standard deviation of 39 values: 1 ± 0.11; a little less, since the largest of several errors counts.
+    for z in [spread(&blocks), spread(&single)] {
+        assert!((0.55..1.35).contains(&z), "{z}");
+    }
+    let brighter = gray(side, side, |i| noise(4096 + i / side / 8 * 16 + i % side / 8) + 0.2);
+    assert!(compare(&brighter, &flat).unwrap().mean.z > 4.0);
+}
+
+#[test]
 fn z_tells_a_bias_from_noise() {
     // Two images of the same mean with independent noise, and then one of them 2 % brighter.
     let (width, height) = (64, 64);

@@ -6,8 +6,10 @@
 //!   channels, so that dark pixels do not decide the sum (relative errors with such a term: Rousselle et al. 2011,
 //!   "Adaptive Sampling and Reconstruction using Greedy Error Minimization").
 //! - trimmed relMSE: the same over the 99 % of pixels with the smallest error, so that a few fireflies do not decide it.
-//! - z of a channel: mean(d) / (std(d) / √N), the mean difference in units of its own standard error, as it follows from
-//!   the scatter of d over the N pixels, with the noise of both images in it. A |z| above 4 or so is a bias.
+//! - z of a channel: the mean difference in units of its own standard error, as it follows from the scatter of d over the image, with the noise
+//!   of both images in it. That is std(t) / √n for the means t of n tiles; pixels that share paths have noise in common, so it is the largest
+//!   for tiles of 1, 2, 4, … pixels on a side, as long as there are 64 ("blocking": Flyvbjerg and Petersen 1989, "Error estimates on averages of
+//!   correlated data"). A |z| above 4 or so is a bias.
 //! - agreement: the share of pixels in which every channel differs by at most a thousandth of the reference. Two renders along
 //!   the same random numbers agree in nearly all pixels, two independent ones in nearly none.
 //!
@@ -20,6 +22,9 @@ const FLOOR: f64 = 0.1;
 
 /// Relative difference up to which a pixel counts as agreeing.
 const AGREEMENT: f64 = 1e-3;
+
+/// The scatter of fewer tiles tells too little.
+const LEAST_TILES: usize = 64;
 
 /// The differences between an image and a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,26 +142,50 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, MetricsEr
         rel_mse,
         trimmed_rel_mse: mean(relative[..kept].iter().copied()),
         agreement: (0..pixels).filter(agrees).count() as f64 / pixels as f64,
-        channels: [0, 1, 2].map(|q| difference(pixels, |p| f64::from(x[q][p]), |p| f64::from(r[q][p]))),
-        mean: difference(pixels, |p| average(&x, p), |p| average(&r, p)),
+        channels: [0, 1, 2].map(|q| difference(image.width, pixels, |p| f64::from(x[q][p]), |p| f64::from(r[q][p]))),
+        mean: difference(image.width, pixels, |p| average(&x, p), |p| average(&r, p)),
     })
 }
 
-/// The mean difference of one channel and its significance.
-fn difference(pixels: usize, image: impl Fn(usize) -> f64, reference: impl Fn(usize) -> f64) -> Difference {
-    let difference = |pixel| image(pixel) - reference(pixel);
-    let mean_difference = mean((0..pixels).map(difference));
-    let squares: f64 = (0..pixels).map(|pixel| (difference(pixel) - mean_difference).powi(2)).sum();
-    // The sample variance needs two pixels; with one there is no scatter to be seen.
-    let variance = squares / (pixels.max(2) - 1) as f64;
-    let standard_error = (variance / pixels as f64).sqrt();
-    let z = if mean_difference == 0.0 { 0.0 } else { mean_difference / standard_error };
+/// The mean difference of one channel and its significance, for rows of so many pixels.
+fn difference(
+    width: usize,
+    pixels: usize,
+    image: impl Fn(usize) -> f64,
+    reference: impl Fn(usize) -> f64,
+) -> Difference {
+    let differences: Vec<f64> = (0..pixels).map(|pixel| image(pixel) - reference(pixel)).collect();
+    let mean_difference = mean(differences.iter().copied());
+    let z = if mean_difference == 0.0 { 0.0 } else { mean_difference / standard_error(&differences, width) };
     Difference {
         image: mean((0..pixels).map(&image)),
         reference: mean((0..pixels).map(&reference)),
         difference: mean_difference,
         z,
     }
+}
+
+/// The standard error of the mean of an image's pixels, which may depend on their neighbours.
+fn standard_error(pixels: &[f64], width: usize) -> f64 {
+    let height = pixels.len() / width;
+    let mut largest = 0.0f64;
+    let mut side = 1;
+    // With one pixel there is no scatter to be seen.
+    while side == 1 || (width / side) * (height / side) >= LEAST_TILES {
+        let (columns, rows) = (width / side, height / side);
+        let tile = |index: usize| {
+            let (left, top) = (index % columns * side, index / columns * side);
+            (top..top + side).map(|y| mean(pixels[y * width + left..][..side].iter().copied())).sum::<f64>()
+                / side as f64
+        };
+        let tiles: Vec<f64> = (0..columns * rows).map(tile).collect();
+        let average = mean(tiles.iter().copied());
+        let squares: f64 = tiles.iter().map(|tile| (tile - average).powi(2)).sum();
+        let variance = squares / (tiles.len().max(2) - 1) as f64;
+        largest = largest.max((variance / tiles.len() as f64).sqrt());
+        side *= 2;
+    }
+    largest
 }
 
 fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
