@@ -61,7 +61,7 @@ void main() {
                 origin = corner - group_offset(SHARERS, push.work.first_sample + of_pixel);
                 own = sharer_number(place);
                 pairs = pairs_of(gl_WorkGroupID.x * (samples_in_tile / SHARERS) + group_in_tile(place) * count + of_pixel);
-                first = load_end(record);
+                first = load_end(record, 0u);
                 first.kind = all(lessThan(origin + place, size)) ? first.kind : END_NONE;
                 vec4 left = SAMPLE(record + 2u);
                 path.left = uint(left.x) | uint(left.y) << 16u;
@@ -79,7 +79,7 @@ void main() {
             uvec2 other = sharer_place(place, to);
             if (first.kind != END_NONE && all(lessThan(origin + other, size))) {
                 uint record = record_of(first_slot + (other.y * TILE + other.x) * count + of_pixel);
-                second = load_end(record + SECOND);
+                second = load_end(record, 1u);
                 asked = second.kind != END_NONE && begin_connection(path, first, second, aim, density, aimed);
                 if (asked) {
                     begin_ray(path, ray, grid, walk, hit);

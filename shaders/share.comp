@@ -53,7 +53,7 @@ void main() {
             uint record = record_of(slots[j]);
             Sent sent = load_sent(record);
             if (HAS_HENYEY_GREENSTEIN) {
-                End second = load_end(record + SECOND);
+                End second = load_end(record, 1u);
                 bool turns = second.kind == END_MEDIUM;
                 float g = MEDIUM(second.medium).g;
                 float found = turns ? eval_henyey_greenstein(g, second.axis, sent.light_direction) : 1.0;

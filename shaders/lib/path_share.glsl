@@ -27,6 +27,7 @@ const uint SECOND = 4u; // the second vertex
 const uint SENT = 6u;   // what it sends: see Sent
 const uint BASE = 11u;  // radiance that came before it
 const uint AIM = 12u;   // what the first vertex's direction went by: the direction to a lamp, and its share
+const uint NORMALS = 13u; // where shading normals are: the geometric ones of the first and the second vertex
 
 const uvec2 SHARE_SIZE = uvec2(2u, SHARERS == 4u ? 2u : 4u);
 
@@ -37,7 +38,8 @@ const float END_MARGIN = 4.0;
 struct End {
     vec3 point;
     uint kind;
-    vec3 axis;      // the normal on its side; in a medium, the direction of propagation
+    vec3 axis;      // the shading normal on its side; in a medium, the direction of propagation
+    vec3 normal;    // of a surface: the geometric normal on its side
     uint medium;    // where the path arrived through
     float offset;   // of a surface: of rays that begin or end here
 };
@@ -92,15 +94,21 @@ uvec2 group_place(uint group) {
     return uvec2(group % (TILE / SHARE_SIZE.x), group / (TILE / SHARE_SIZE.x)) * SHARE_SIZE;
 }
 
-void store_end(uint at, Path path, Vertex vertex) {
+// Stores the first vertex (0) or the second one (1) of a record.
+void store_end(uint record, uint which, Path path, Vertex vertex) {
+    uint at = record + which * SECOND;
     uint kind = vertex.in_medium ? END_MEDIUM : END_SURFACE;
     store_sample(at, vec4(vertex.point, float(kind | path.medium << 2u)));
     store_sample(at + 1u, vec4(vertex.axis, path.offset));
+    if (HAS_SHADING_NORMALS) {
+        store_sample(record + NORMALS + which, vec4(vertex.normal, 0.0));
+    }
 }
 
-End load_end(uint at) {
-    vec4 point = SAMPLE(at), axis = SAMPLE(at + 1u);
-    return End(point.xyz, uint(point.w) & 3u, axis.xyz, uint(point.w) >> 2u, axis.w);
+End load_end(uint record, uint which) {
+    vec4 point = SAMPLE(record + which * SECOND), axis = SAMPLE(record + which * SECOND + 1u);
+    vec3 normal = HAS_SHADING_NORMALS ? SAMPLE(record + NORMALS + which).xyz : axis.xyz;
+    return End(point.xyz, uint(point.w) & 3u, axis.xyz, normal, uint(point.w) >> 2u, axis.w);
 }
 
 bool can_share(Path path, Vertex vertex) {
@@ -108,8 +116,7 @@ bool can_share(Path path, Vertex vertex) {
         return !HAS_PHASES || vertex.phase == 0u;
     }
     bool diffuse = vertex.surface.flags >> SURFACE_KIND_SHIFT == BSDF_DIFFUSE;
-    bool plain = (vertex.surface.flags & SURFACE_SMOOTH) == 0u && vertex.surface.relief_texture == 0u;
-    return diffuse && plain && path.medium != NONE;
+    return diffuse && vertex.surface.relief_texture == 0u && path.medium != NONE;
 }
 
 // A sample begins: none of its vertices is kept.
@@ -124,13 +131,13 @@ void share_vertex(inout Path path, inout Vertex vertex) {
     if (path.depth == 0u && can_share(path, vertex)) {
         vec3 weight = path.throughput * (vertex.in_medium ? vertex.albedo : vertex.surface.reflectance);
         if (max_component(weight) > 0.0) {
-            store_end(record, path, vertex);
+            store_end(record, 0u, path, vertex);
             store_sample(record + 2u, vec4(float(path.left & 0xffffu), float(path.left >> 16u), 1.0, 0.0));
             store_sample(record + RECORD_WEIGHT, vec4(weight, 0.0));
             path.sharing = 1u;
         }
     } else if (path.depth == 1u && path.sharing == 1u && can_share(path, vertex)) {
-        store_end(record + SECOND, path, vertex);
+        store_end(record, 1u, path, vertex);
         store_sample(record + BASE, vec4(path.radiance, HAS_MEDIA && !HAS_CHROMATIC ? path.tau : 0.0));
         path.radiance = vec3(0.0);
         path.before = vertex.in_medium ? path.throughput * vertex.albedo : path.throughput;
@@ -192,12 +199,12 @@ bool begin_connection(inout Path path, End first, End second, Aim aim, out float
     vec3 way = second.point - first.point;
     vec3 begin = first.point, end = second.point;
     if (first.kind == END_SURFACE) {
-        begin += first.axis * (dot(first.axis, way) >= 0.0 ? first.offset : -first.offset);
+        begin += first.normal * (dot(first.normal, way) >= 0.0 ? first.offset : -first.offset);
     }
     if (second.kind == END_SURFACE) {
         // The distance to the surface itself is rounded as well as its points are.
         float margin = END_MARGIN * second.offset;
-        end += second.axis * (dot(second.axis, way) <= 0.0 ? margin : -margin);
+        end += second.normal * (dot(second.normal, way) <= 0.0 ? margin : -margin);
     }
     way = end - begin;
     float far = length(way);
@@ -212,11 +219,15 @@ bool begin_connection(inout Path path, End first, End second, Aim aim, out float
     path.shadow = true;
     if (first.kind == END_SURFACE) {
         density = max(dot(first.axis, path.direction), 0.0) * INV_PI;
+        density = HAS_SHADING_NORMALS && dot(first.normal, path.direction) <= 0.0 ? 0.0 : density;
     } else {
         density = HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(MEDIUM(first.medium).g, first.axis, path.direction) : INV_4PI;
     }
     aimed = aimed_pdf(aim, density, path.direction) / density;
-    density *= second.kind == END_SURFACE ? max(-dot(second.axis, path.direction), 0.0) : 1.0;
+    if (second.kind == END_SURFACE) {
+        density *= max(-dot(second.normal, path.direction), 0.0);
+        density = HAS_SHADING_NORMALS && dot(second.axis, path.direction) >= 0.0 ? 0.0 : density;
+    }
     density /= far * far;
     return far > 0.0 && density > 0.0;
 }

@@ -571,7 +571,7 @@ pub const MEDIUM_SEALED: u32 = 1 << 28;
 /// Pixels along the side of a tile; a workgroup of the path tracer renders one tile.
 pub const TILE: u32 = 8;
 /// Vectors of four numbers in the record of a path that pixels share: see `lib/path_share.glsl`.
-pub const RECORD_VECTORS: u32 = 13;
+pub const RECORD_VECTORS: u32 = 15;
 /// Which of them holds the weight of the first vertex, and in the end what the group brought.
 pub const RECORD_WEIGHT: u32 = 3;
 /// Longest distance; rays that end nowhere end here.

@@ -9,7 +9,7 @@ use super::path_aim::{Aim, aimed_pdf, is_common};
 use super::path_state::{Hit, NONE, Path, medium_at};
 use super::path_vertex::Vertex;
 use super::phase::eval_henyey_greenstein;
-use crate::pack::layout::{BSDF_DIFFUSE, SURFACE_KIND_SHIFT, SURFACE_SMOOTH};
+use crate::pack::layout::{BSDF_DIFFUSE, SURFACE_KIND_SHIFT};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -35,8 +35,10 @@ pub struct End {
     pub point: DVec3,
     /// On what.
     pub kind: Kind,
-    /// The normal on its side; in a medium, the direction of propagation.
+    /// The shading normal on its side; in a medium, the direction of propagation.
     pub axis: DVec3,
+    /// Of a surface: the geometric normal on its side.
+    pub normal: DVec3,
     /// The one that the path arrived through.
     pub medium: u32,
     /// Of a surface: of rays that begin or end here.
@@ -80,13 +82,13 @@ pub fn can_share(path: &Path, vertex: &Vertex) -> bool {
         return vertex.phase == 0;
     }
     let surface = &vertex.surface;
-    let plain = surface.flags & SURFACE_SMOOTH == 0 && surface.relief_texture == 0;
-    surface.flags >> SURFACE_KIND_SHIFT == BSDF_DIFFUSE && plain && path.medium != NONE
+    surface.flags >> SURFACE_KIND_SHIFT == BSDF_DIFFUSE && surface.relief_texture == 0 && path.medium != NONE
 }
 
 fn end_of(path: &Path, vertex: &Vertex) -> End {
     let kind = if vertex.in_medium { Kind::Medium } else { Kind::Surface };
-    End { point: vertex.point, kind, axis: vertex.axis, medium: path.medium, offset: path.offset }
+    let Vertex { point, axis, normal, .. } = *vertex;
+    End { point, kind, axis, normal, medium: path.medium, offset: path.offset }
 }
 
 /// Before the path scatters: keeps its first two vertices. From the second one on the path gathers radiance for a throughput of 1.
@@ -156,21 +158,25 @@ fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(P
     let way = second.point - first.point;
     let (mut begin, mut end) = (first.point, second.point);
     if first.kind == Kind::Surface {
-        begin += first.axis * if first.axis.dot(way) >= 0.0 { first.offset } else { -first.offset };
+        begin += first.normal * if first.normal.dot(way) >= 0.0 { first.offset } else { -first.offset };
     }
     if second.kind == Kind::Surface {
         let margin = END_MARGIN * second.offset;
-        end += second.axis * if second.axis.dot(way) <= 0.0 { margin } else { -margin };
+        end += second.normal * if second.normal.dot(way) <= 0.0 { margin } else { -margin };
     }
     let way = end - begin;
     let far = way.length();
     let direction = way / far;
     let mut density = match first.kind {
+        Kind::Surface if first.normal.dot(direction) <= 0.0 => 0.0,
         Kind::Surface => first.axis.dot(direction).max(0.0) / PI,
         _ => eval_henyey_greenstein(medium_at(tables, first.medium).g, first.axis, direction),
     };
     let aimed = aimed_pdf(&record.aim, density, direction) / density;
-    density *= if second.kind == Kind::Surface { (-second.axis.dot(direction)).max(0.0) } else { 1.0 };
+    if second.kind == Kind::Surface {
+        let seen = second.axis.dot(direction) < 0.0;
+        density *= if seen { (-second.normal.dot(direction)).max(0.0) } else { 0.0 };
+    }
     density /= far * far;
     let path = Path {
         origin: begin,
