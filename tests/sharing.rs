@@ -9,7 +9,7 @@ use glam::DVec3;
 use tyndall::gpu::shader::Variant;
 use tyndall::pack::Packed;
 use tyndall::pilot;
-use tyndall::scene::{Film, Integrator, Light, Medium, ReconstructionFilter, Scene, Shape};
+use tyndall::scene::{Film, Geometry, Integrator, Light, Medium, Mesh, ReconstructionFilter, Scene, Shape};
 
 const SIDE: u32 = 64;
 
@@ -49,14 +49,20 @@ fn cases(side: u32) -> Vec<(&'static str, Scene)> {
     let small = scenes::quad(v(0.3, 0.2, 0.0), DVec3::X * 0.1, DVec3::Z * 0.1);
     lantern.shapes.push(Shape::lamp("lamp", small, v(90.0, 80.0, 70.0)));
     lantern.lights.push(Light::Constant { radiance: v(0.1, 0.2, 0.3) });
-    // Shading normals, first and second, on facets so coarse that the two kinds differ by far.
+    // Shading normals, first and second: a floor that leans as far as one can without a gap in what it reflects, and a ball of few facets.
     let mut smooth = Scene::new(scenes::camera(4.0), Film::new(side, side));
     scenes::walls(&mut smooth);
     smooth.shapes.push(scenes::lamp());
-    for (k, center) in [v(-0.45, -0.5, 0.0), v(0.45, -0.5, 0.2), v(0.0, 0.2, -0.3)].into_iter().enumerate() {
-        let ball = scenes::smooth_ball(k as u32 % 2, center, 0.45);
-        smooth.shapes.push(Shape::diffuse("ball", ball, v(0.8, 0.6, 0.5)));
-    }
+    let corners = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+    let floor = Mesh {
+        positions: corners.map(|(x, z)| v(x, -0.6, z)).to_vec(),
+        normals: vec![v(0.8, 0.6, 0.0); 4],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    smooth.shapes.push(Shape::diffuse("floor", Geometry::Mesh(floor), v(0.8, 0.8, 0.8)));
+    let ball = scenes::smooth_ball(1, v(0.3, -0.1, 0.0), 0.4);
+    smooth.shapes.push(Shape::diffuse("ball", ball, v(0.8, 0.6, 0.5)));
     cases.extend([
         ("smooth", smooth),
         ("glare", glare),
