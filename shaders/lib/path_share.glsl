@@ -223,7 +223,7 @@ bool begin_connection(inout Path path, End first, End second, Aim aim, out float
     } else {
         density = HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(MEDIUM(first.medium).g, first.axis, path.direction) : INV_4PI;
     }
-    aimed = aimed_pdf(aim, density, path.direction) / density;
+    aimed = HAS_EQUIANGULAR ? aimed_pdf(aim, density, path.direction) / density : 1.0;
     if (second.kind == END_SURFACE) {
         density *= max(-dot(second.normal, path.direction), 0.0);
         density = HAS_SHADING_NORMALS && dot(second.axis, path.direction) >= 0.0 ? 0.0 : density;
