@@ -28,7 +28,7 @@ void main() {
     End first, second;
     vec3 weight = vec3(0.0);
     float density = 0.0, aimed = 1.0;
-    Aim aim = Aim(vec3(0.0), 0.0, 0.0);
+    Aim aim = Aim(vec3(0.0), 0.0, 0.0, 0.0);
     bool asked = false;
     Path path;
     path.shadow = true;
@@ -38,7 +38,7 @@ void main() {
     Walk walk = Walk(0u, 0u, 0u);
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {
-            vec4 found = asked ? end_connection(hit, second, weight, density, aimed) : vec4(0.0);
+            vec4 found = asked ? end_connection(path, hit, first, second, aim, weight, density, aimed) : vec4(0.0);
             if (next > 0u) {
                 store_pair(pairs, own, to, found);
             }
@@ -67,7 +67,8 @@ void main() {
                 path.left = uint(left.x) | uint(left.y) << 16u;
                 if (HAS_EQUIANGULAR) {
                     vec4 goes_by = SAMPLE(record + AIM);
-                    aim = Aim(goes_by.xyz, goes_by.w, 0.0);
+                    float reach = length(goes_by.xyz);
+                    aim = Aim(goes_by.xyz / max(reach, 1e-30), reach, goes_by.w, 0.0);
                 }
                 if (HAS_CHROMATIC) {
                     weight = SAMPLE(record + RECORD_WEIGHT).xyz;
@@ -89,6 +90,7 @@ void main() {
                     walk = Walk(0u, 0u, 0u);
                     hit.blocked = false;
                     hit.tau = SAMPLE(record + BASE).w;
+                    hit.first = HAS_EQUIANGULAR ? SAMPLE(record + RECORD_WEIGHT).w : INFINITE_DISTANCE;
                 }
             }
         }

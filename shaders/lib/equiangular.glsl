@@ -43,3 +43,10 @@ float equiangular_pdf(Stretch stretch, float s) {
     bool inside = s >= 0.0 && s <= stretch.extent && stretch.angle > 0.0;
     return inside ? stretch.distance / (stretch.angle * (stretch.distance * stretch.distance + along * along)) : 0.0;
 }
+
+// Probability of a distance beyond s.
+float equiangular_rest(Stretch stretch, float s) {
+    float left = stretch.extent - s, d = stretch.distance;
+    float angle = arctan2(d * left, d * d + (stretch.begin + s) * (stretch.begin + stretch.extent));
+    return left > 0.0 && stretch.angle > 0.0 ? angle / stretch.angle : 0.0;
+}

@@ -225,6 +225,24 @@ void pass_absorbing(inout Path path, vec3 depth) {
     path.crossings += 1u;
 }
 
+// The end of the medium in which an open flight began, after `way`. From here on it is a free flight, with a channel and a length of its own.
+void leave_open_flight(inout Path path, Medium medium, float way) {
+    vec3 tau = medium.sigma_t * way;
+    float passage = mean_passage(HAS_CHROMATIC ? channel_weights(path.throughput) : vec3(0.0), tau);
+    path.throughput /= open_factor(open_flight_of(path, medium), way, false, passage);
+    path.open = false;
+    path.first_way = way;
+    vec4 u = sample_set(path, MASK_SETS + path.crossings);
+    path.crossings += 1u;
+    path.tau_left = minus_log_1m(u.z);
+    if (HAS_CHROMATIC && passage > 0.0) {
+        path.throughput *= exp_minus(tau) / passage;
+        path.pdf *= passage;
+        path.tau_rgb = vec3(0.0);
+        path.channel = sample_channel(channel_weights(path.throughput), u.w);
+    }
+}
+
 // Puts the one of the BSDFs of a surface in its place that acts at this vertex: by the side, or by chance. A choice has the share of the
 // BSDF as its probability, so the throughput stays, and all that follows at the vertex knows of one BSDF alone.
 void choose_surface(Path path, inout Surface surface, Primitive primitive, Hit hit, bool back) {
@@ -316,6 +334,9 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         }
         if (HAS_GRIDS) {
             path.tau_mean += medium.sigma_t * way;
+        }
+        if (HAS_SHARING && HAS_EQUIANGULAR && path.open) {
+            leave_open_flight(path, medium, way);
         }
     }
     if (!surface_hit) {

@@ -14,6 +14,7 @@ const float BROAD = 8.0;
 
 struct Aim {
     vec3 axis;      // to a point of the lamp
+    float reach;    // the distance to it
     float share;    // probability of directions by the lamp; 0 where only scattering counts
     float u;        // decides between the two
 };
@@ -31,7 +32,7 @@ vec3 light_pivot(Light light, vec2 u) {
 
 // What a vertex's next direction goes by. Glass is left to its own: a direction through it is not seen from the other side.
 Aim find_aim(Path path, Vertex vertex) {
-    Aim aim = Aim(vec3(0.0, 0.0, 1.0), 0.0, 0.0);
+    Aim aim = Aim(vec3(0.0, 0.0, 1.0), 0.0, 0.0, 0.0);
     bool may = vertex.in_medium || !HAS_DIELECTRIC || (vertex.surface.flags & SURFACE_ORIENTED) == 0u;
     if (HAS_EQUIANGULAR && may && MEDIUM(valid_medium(path.medium)).equiangular > 0.0) {
         // The next segment's numbers: its distances go by the same point.
@@ -40,7 +41,8 @@ Aim find_aim(Path path, Vertex vertex) {
         vec3 way = light_pivot(light, v.zw) - vertex.point;
         float squared = dot(way, way);
         if (squared > 0.0) {
-            aim = Aim(way * inversesqrt(squared), AIMED_SHARE * squared / (squared + BROAD * light.area), v.y);
+            float reach = sqrt(squared);
+            aim = Aim(way / reach, reach, AIMED_SHARE * squared / (squared + BROAD * light.area), v.y);
         }
     }
     return aim;

@@ -47,8 +47,14 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
     if (!mixed) {
         // Not the difference of two distances, which are rounded.
         end.way = free_flight(path.tau_left, HAS_ABSORBING ? medium.flight_share * sigma : sigma);
+        if (HAS_SHARING && HAS_EQUIANGULAR && path.open) {
+            end.way = path.way;
+            vec3 collision = medium.sigma_t * exp_minus(medium.sigma_t * end.way);
+            float free = HAS_CHROMATIC ? dot(weights, collision) : collision.x;
+            end.weight /= open_factor(open_flight_of(path, medium), end.way, true, free);
+        }
         if (HAS_CHROMATIC) {
-            end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * end.way, medium.sigma_t, medium.albedo);
+            end.weight *= scatter_weight(weights, path.tau_rgb + medium.sigma_t * end.way, medium.sigma_t, vec3(1.0));
         }
         end.weight *= rare_collision_weight(medium, end.way);
         return end;

@@ -19,7 +19,7 @@ vec3 depth_at_infinity(Path path) {
 Hit begin_hit(Path path) {
     // Extension rays see a little beyond their flight: see flight_point().
     float t_max = HAS_MEDIA && !path.shadow ? path.t_max + near_distance(path, path.t_max) : path.t_max;
-    Hit hit = Hit(t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false, 0u, 1.0);
+    Hit hit = Hit(t_max, NONE, false, vec2(0.0), 0.0, vec3(0.0), false, INFINITE_DISTANCE, 0u, 1.0);
     if (HAS_MEDIA && HAS_LIGHT_SAMPLING && path.shadow) {
         uint medium = HAS_DIELECTRIC ? path.light_medium : path.medium;
         vec3 tau = MEDIUM(valid_medium(medium)).sigma_t * shadow_length(path) + depth_at_infinity(path);
@@ -78,6 +78,9 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
             if (HAS_CHROMATIC && counts && boundary) {
                 hit.tau_rgb += SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE)).sigma_t_step * way;
             }
+        }
+        if (HAS_SHARING && HAS_EQUIANGULAR) {
+            hit.first = counts && boundary ? min(hit.first, t) : hit.first;
         }
         hit.blocked = hit.blocked || opaque;
         if (HAS_VOLUME_LIGHTS && counts && boundary) {

@@ -22,11 +22,11 @@ const uint END_SURFACE = 1u;
 const uint END_MEDIUM = 2u;
 
 // The RECORD_VECTORS of a record: the first vertex in two; the triangle that its rays leave, and what the second vertex's direction went by;
-// the first one's weight; and then from here on:
+// the first one's weight, and how far the flight from there went until it left its medium; and then from here on:
 const uint SECOND = 4u; // the second vertex
 const uint SENT = 6u;   // what it sends: see Sent
 const uint BASE = 11u;  // radiance that came before it
-const uint AIM = 12u;   // what the first vertex's direction went by: the direction to a lamp, and its share
+const uint AIM = 12u;   // what the first vertex's direction went by: the way to a lamp, and its share
 const uint NORMALS = 13u; // where shading normals are: the geometric ones of the first and the second vertex
 
 const uvec2 SHARE_SIZE = uvec2(2u, SHARERS == 4u ? 2u : 4u);
@@ -139,6 +139,9 @@ void share_vertex(inout Path path, inout Vertex vertex) {
     } else if (path.depth == 1u && path.sharing == 1u && can_share(path, vertex)) {
         store_end(record, 1u, path, vertex);
         store_sample(record + BASE, vec4(path.radiance, HAS_MEDIA && !HAS_CHROMATIC ? path.tau : 0.0));
+        if (HAS_EQUIANGULAR) {
+            SAMPLE(record + RECORD_WEIGHT).w = path.first_way;
+        }
         path.radiance = vec3(0.0);
         path.before = vertex.in_medium ? path.throughput * vertex.albedo : path.throughput;
         // The densities are those of flights that end in media that only absorb as well. A path that does not brings so much less instead.
@@ -154,7 +157,8 @@ void share_vertex(inout Path path, inout Vertex vertex) {
 void share_aim(inout Path path, Vertex vertex, Aim aim, inout BsdfSample next, float scattered) {
     uint record = record_of(path.slot);
     if (path.sharing == 1u && path.depth == 1u) {
-        store_sample(record + AIM, vec4(aim.axis, aim.share));
+        path.lamp_way = aim.axis * aim.reach;
+        store_sample(record + AIM, vec4(path.lamp_way, aim.share));
     } else if (is_common(path, vertex) && aim.share > 0.0 && scattered > 0.0) {
         SAMPLE(record + 2u).zw = vec2(1.0 - aim.share, aimed_pdf(aim, 0.0, next.direction));
         float ratio = scattered / next.pdf;
@@ -232,8 +236,18 @@ bool begin_connection(inout Path path, End first, End second, Aim aim, out float
     return far > 0.0 && density > 0.0;
 }
 
+// The density of a flight that ends at the second vertex, over that of a free flight, which is `free` for a density of 1.
+float connection_factor(Path path, Hit hit, End first, End second, Aim aim, vec3 weights, float free) {
+    Medium medium = MEDIUM(first.medium);
+    OpenFlight flight = open_flight(medium, weights, path.origin, path.direction, aim.axis * aim.reach);
+    bool leaves = hit.first < path.t_max;
+    float way = min(hit.first, path.t_max);
+    bool ends = !leaves && second.kind == END_MEDIUM;
+    return open_factor(flight, way, ends, ends ? free : mean_passage(weights, medium.sigma_t * way));
+}
+
 // What a connection whose ray has been traced brings in each channel, and its density by the flight of the first vertex, which chooses one.
-vec4 end_connection(Hit hit, End second, vec3 weight, float density, float aimed) {
+vec4 end_connection(Path path, Hit hit, End first, End second, Aim aim, vec3 weight, float density, float aimed) {
     if (hit.blocked) {
         return vec4(0.0);
     }
@@ -242,7 +256,10 @@ vec4 end_connection(Hit hit, End second, vec3 weight, float density, float aimed
         passes *= HAS_CHROMATIC ? exp_minus(max(hit.tau_rgb, vec3(0.0))) : vec3(exp_minus(max(hit.tau, 0.0)));
         passes *= second.kind == END_MEDIUM ? MEDIUM(second.medium).sigma_t : vec3(1.0);
     }
-    return vec4(passes, aimed * (HAS_CHROMATIC ? dot(channel_weights(weight), passes) : passes.x));
+    vec3 weights = HAS_CHROMATIC ? channel_weights(weight) : vec3(0.0);
+    float found = HAS_CHROMATIC ? dot(weights, passes) : passes.x;
+    float factor = HAS_EQUIANGULAR ? aimed * connection_factor(path, hit, first, second, aim, weights, found / density) : 1.0;
+    return vec4(passes, factor * found);
 }
 
 // The phase function of the second vertex for light from `from`.

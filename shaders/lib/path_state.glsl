@@ -4,6 +4,7 @@
 #include "lib/medium.glsl"
 #include "lib/light.glsl"
 #include "lib/grid.glsl"
+#include "lib/open_flight.glsl"
 
 // More than minus_log_1m ever gives: no flight is longer.
 const float MAX_FLIGHT_TAU = 16.7;
@@ -71,6 +72,10 @@ struct Path {
     uint sharing;           // 1: the first vertex is kept; 2: the second one is, and radiance is that of a throughput of 1 from there
     vec3 before;            // the throughput at the second vertex
     vec3 shared_direction;  // in which the path left it
+    vec3 lamp_way;          // from the first vertex to the lamp that the flight from there may go by, or 0
+    bool open;              // it goes by lib/open_flight.glsl, and has not left the medium in which it began
+    float way;              // its length
+    float first_way;        // how far it went until it left that medium
     // Roulette by a pilot.
     vec3 focus;             // one over the square of the pixel's radiance
     bool foreseen;          // the pilot knows the vertex
@@ -86,6 +91,7 @@ struct Hit {
     float tau;              // shadow rays: optical depth
     vec3 tau_rgb;
     bool blocked;           // shadow rays: something is in the way
+    float first;            // shadow rays: distance of the first boundary
     uint medium;            // shadow rays to an emitting medium: the medium at the end of the ray
     float passed;           // shadow rays, where masks are: fraction of the light that passes them
 };
@@ -142,8 +148,8 @@ float channel_of(vec3 v, uint channel) {
     return channel == 0u ? v.x : (channel == 1u ? v.y : v.z);
 }
 
-// Whether the flight's distance goes by lamps as well. Not from the first vertex to the second of a path that is shared: its density must
-// be known from the two alone.
+// Whether the flight's distance goes by lamps as well, up to what the ray meets. Not from the first vertex to the second of a path that is
+// shared: see begin_open_flight().
 bool goes_by_lamps(Path path, Medium medium) {
     bool connects = HAS_SHARING && path.sharing == 1u && path.depth == 1u;
     return HAS_EQUIANGULAR && medium.equiangular > 0.0 && !connects;
@@ -161,10 +167,32 @@ float flight_end(Path path) {
     vec3 sigma_t = medium.sigma_t;
     float sigma = HAS_CHROMATIC ? channel_of(sigma_t, path.channel) : sigma_t.x;
     float flight = free_flight(path.tau_left, HAS_ABSORBING ? medium.flight_share * sigma : sigma);
-    if (goes_by_lamps(path, medium)) {
+    if (HAS_SHARING && HAS_EQUIANGULAR && path.open) {
+        flight = path.way;
+    } else if (goes_by_lamps(path, medium)) {
         flight = free_flight(MAX_FLIGHT_TAU, medium.least_sigma_t);
     }
     return min(path.t_min + flight, path.far_end);
+}
+
+OpenFlight open_flight_of(Path path, Medium medium) {
+    vec3 weights = HAS_CHROMATIC ? channel_weights(path.throughput) : vec3(0.0);
+    return open_flight(medium, weights, path.origin, path.direction, path.lamp_way);
+}
+
+// The flight from the first vertex of a path that is shared to the second: whether it goes by a lamp as well, and then how far it gets.
+void begin_open_flight(inout Path path, float u) {
+    Medium medium = MEDIUM(valid_medium(path.medium));
+    OpenFlight flight = open_flight_of(path, medium);
+    path.open = path.sharing == 1u && path.depth == 1u && flight.share > 0.0;
+    path.first_way = INFINITE_DISTANCE;
+    if (path.open) {
+        path.tau_left = minus_log_1m((u - flight.share) / (1.0 - flight.share));
+        path.way = free_flight(path.tau_left, HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x);
+        if (u < flight.share) {
+            path.way = sample_equiangular(flight.stretch, u / flight.share);
+        }
+    }
 }
 
 // A new segment along path.direction: its flight from two random numbers.
@@ -179,6 +207,9 @@ void begin_segment(inout Path path, vec2 u) {
         if (HAS_CHROMATIC) {
             path.tau_rgb = vec3(0.0);
             path.channel = sample_channel(channel_weights(path.throughput), u.y);
+        }
+        if (HAS_SHARING && HAS_EQUIANGULAR) {
+            begin_open_flight(path, u.x);
         }
     }
     if (HAS_GRIDS) {

@@ -34,6 +34,7 @@ sources! {
     "lib/light.glsl",
     "lib/math.glsl",
     "lib/medium.glsl",
+    "lib/open_flight.glsl",
     "lib/outlook.glsl",
     "lib/path.glsl",
     "lib/path_aim.glsl",

@@ -51,3 +51,13 @@ pub fn equiangular_pdf(stretch: &Stretch, s: f64) -> f64 {
         0.0
     }
 }
+
+/// Probability of a distance beyond s.
+pub fn equiangular_rest(stretch: &Stretch, s: f64) -> f64 {
+    let (left, d) = (stretch.extent - s, stretch.distance);
+    if left > 0.0 && stretch.angle > 0.0 {
+        arctan2(d * left, d * d + (stretch.begin + s) * (stretch.begin + stretch.extent)) / stretch.angle
+    } else {
+        0.0
+    }
+}

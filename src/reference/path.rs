@@ -6,8 +6,9 @@ use super::bsdf::bsdf_has_density;
 use super::camera::{camera_direction, focused_direction, lens_point};
 use super::film::{group_offset, group_size};
 use super::filter::sample_filter;
-use super::math::{exp_minus_rgb, max_component, orthonormal_frame};
+use super::math::{exp_minus_rgb, max_component, minus_log_1m, orthonormal_frame};
 use super::medium::{channel_weights, sample_channel};
+use super::open_flight::{mean_passage, open_factor};
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
 use super::path_aim::{aimed_pdf, find_aim, is_common, sample_next, weighing_pdf};
 use super::path_flight::{
@@ -19,8 +20,8 @@ pub use super::path_rays::{begin_hit, test_primitive};
 use super::path_share::{share_aim, share_ended, share_light, share_vertex};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
-    INFINITE_DISTANCE, begin_segment, flight_end, medium_at, sample_camera, sample_lens, sample_set, sample_vertex,
-    survived_throughput,
+    INFINITE_DISTANCE, begin_segment, flight_end, medium_at, open_flight_of, sample_camera, sample_lens, sample_set,
+    sample_vertex, survived_throughput,
 };
 use super::path_surface::{
     Place, apply_textures, opacity_at, pane_depth, shading_normal, share_at, surface_tangent, turn_frame,
@@ -236,6 +237,23 @@ fn pass_absorbing(tables: &Tables, path: &mut Path, depth: DVec3) {
     path.crossings += 1;
 }
 
+/// The end of the medium in which an open flight began, after `way`. From here on it is a free flight.
+fn leave_open_flight(tables: &Tables, path: &mut Path, medium: &Medium, way: f64) {
+    let tau = medium.sigma_t * way;
+    let passage = mean_passage(channel_weights(path.throughput), tau);
+    path.throughput /= open_factor(&open_flight_of(path, medium), way, false, passage);
+    path.open = false;
+    let u = sample_set(tables, path, MASK_SETS + path.crossings);
+    path.crossings += 1;
+    path.tau_left = minus_log_1m(u.z);
+    if passage > 0.0 {
+        path.throughput *= exp_minus_rgb(tau) / passage;
+        path.pdf *= passage;
+        path.tau_rgb = DVec3::ZERO;
+        path.channel = sample_channel(channel_weights(path.throughput), u.w);
+    }
+}
+
 /// The one of the BSDFs of a surface that acts at this vertex: by the side, or by chance.
 fn chosen_surface<'a>(
     tables: &'a Tables,
@@ -321,6 +339,9 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         }
         path.tau_rgb += medium.sigma_t * end.dense;
         path.tau_mean += medium.sigma_t * end.dense;
+        if path.open {
+            leave_open_flight(tables, path, &medium, end.way);
+        }
     }
     if !surface_hit {
         add_sky(tables, path);

@@ -23,6 +23,8 @@ const BROAD: f64 = 8.0;
 pub struct Aim {
     /// To a point of the lamp.
     pub axis: DVec3,
+    /// The distance to it.
+    pub reach: f64,
     /// Probability of directions by the lamp; 0 where only scattering counts.
     pub share: f64,
     /// Decides between the two.
@@ -39,7 +41,7 @@ pub fn light_pivot(light: &Light, u: DVec2) -> DVec3 {
 
 /// The aim of a vertex; glass is left to its own.
 pub fn find_aim(tables: &Tables, path: &Path, vertex: &Vertex) -> Aim {
-    let mut aim = Aim { axis: DVec3::Z, share: 0.0, u: 0.0 };
+    let mut aim = Aim { axis: DVec3::Z, reach: 0.0, share: 0.0, u: 0.0 };
     let may = vertex.in_medium || vertex.surface.flags & SURFACE_ORIENTED == 0;
     if may && medium_at(tables, path.medium).equiangular > 0.0 {
         let mut v = sample_set(tables, path, PIVOT_SET + path.segment + 1);
@@ -48,7 +50,8 @@ pub fn find_aim(tables: &Tables, path: &Path, vertex: &Vertex) -> Aim {
         let squared = way.length_squared();
         if squared > 0.0 {
             let share = AIMED_SHARE * squared / (squared + BROAD * light.area);
-            aim = Aim { axis: way / squared.sqrt(), share, u: v.y };
+            let reach = squared.sqrt();
+            aim = Aim { axis: way / reach, reach, share, u: v.y };
         }
     }
     aim

@@ -8,9 +8,10 @@ use super::grid::{
 };
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
 use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight, survival_weight};
+use super::open_flight::open_factor;
 use super::path_aim::{PIVOT_SET, light_pivot};
 use super::path_state::{
-    FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, choose_light, goes_by_lamps, medium_at, sample_set,
+    FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, choose_light, goes_by_lamps, medium_at, open_flight_of, sample_set,
 };
 use super::ray::{offset_distance, vertex_clearance};
 use super::sampler::set_key;
@@ -61,7 +62,12 @@ pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, sur
     let weights = channel_weights(path.throughput);
     if !mixed {
         end.way = free_flight(path.tau_left, medium.flight_share * sigma);
-        end.weight = scatter_weight(weights, path.tau_rgb + medium.sigma_t * end.way, medium.sigma_t, medium.albedo);
+        if path.open {
+            end.way = path.way;
+            let free = weights.dot(medium.sigma_t * exp_minus_rgb(medium.sigma_t * end.way));
+            end.weight /= open_factor(&open_flight_of(path, medium), end.way, true, free);
+        }
+        end.weight *= scatter_weight(weights, path.tau_rgb + medium.sigma_t * end.way, medium.sigma_t, DVec3::ONE);
         end.weight *= rare_collision_weight(medium, end.way);
         return end;
     }

@@ -33,6 +33,7 @@ pub fn begin_hit(tables: &Tables, path: &Path) -> Hit {
         barycentric: DVec2::ZERO,
         tau_rgb: DVec3::ZERO,
         blocked: false,
+        first: INFINITE_DISTANCE,
         medium: path.light_medium,
         passed: 1.0,
     };
@@ -98,6 +99,9 @@ pub fn record(tables: &Tables, path: &Path, index: u32, crossing: Crossing, hit:
             let (inside, outside) = (surface.media & 0xffff, surface.media >> 16);
             let (from, to) = if along_normal { (inside, outside) } else { (outside, inside) };
             hit.medium = hit.medium.wrapping_add(to).wrapping_sub(from);
+        }
+        if counts && boundary {
+            hit.first = hit.first.min(t);
         }
         hit.blocked |= opaque;
     } else if begins && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE)) {

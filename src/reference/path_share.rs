@@ -5,6 +5,7 @@ use super::bindings::Tables;
 use super::bsdf::BsdfSample;
 use super::math::{exp_minus_rgb, max_component};
 use super::medium::channel_weights;
+use super::open_flight::{mean_passage, open_factor, open_flight};
 use super::path_aim::{Aim, aimed_pdf, is_common};
 use super::path_state::{Hit, NONE, Path, medium_at};
 use super::path_vertex::Vertex;
@@ -122,6 +123,7 @@ pub fn share_vertex(tables: &Tables, path: &mut Path, vertex: &mut Vertex) {
 pub fn share_aim(path: &mut Path, vertex: &Vertex, aim: &Aim, next: &mut BsdfSample, scattered: f64) {
     if path.sharing == 1 && path.depth == 1 {
         path.record.aim = *aim;
+        path.lamp_way = aim.axis * aim.reach;
     } else if is_common(path, vertex) && aim.share > 0.0 && scattered > 0.0 {
         path.record.unaimed = 1.0 - aim.share;
         path.record.aimed = aimed_pdf(aim, 0.0, next.direction);
@@ -195,8 +197,26 @@ fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(P
     (far > 0.0 && density > 0.0).then_some((path, density, aimed))
 }
 
+/// The density of a flight that ends at the second vertex, over that of a free flight, which is `free` for a density of 1.
+fn connection_factor(tables: &Tables, path: &Path, hit: &Hit, second: &End, from: &Record, free: f64) -> f64 {
+    let (medium, weights) = (medium_at(tables, from.first.medium), channel_weights(from.weight));
+    let flight = open_flight(medium, weights, path.origin, path.direction, from.aim.axis * from.aim.reach);
+    let way = hit.first.min(path.t_max);
+    let ends = hit.first >= path.t_max && second.kind == Kind::Medium;
+    let free = if ends { free } else { mean_passage(weights, medium.sigma_t * way) };
+    open_factor(&flight, way, ends, free)
+}
+
 /// What a connection brings in each channel, and its density as the flight of the first vertex chooses one.
-fn end_connection(tables: &Tables, hit: &Hit, second: &End, from: &Record, density: f64, aimed: f64) -> (DVec3, f64) {
+fn end_connection(
+    tables: &Tables,
+    path: &Path,
+    hit: &Hit,
+    second: &End,
+    from: &Record,
+    density: f64,
+    aimed: f64,
+) -> (DVec3, f64) {
     if hit.blocked {
         return (DVec3::ZERO, 0.0);
     }
@@ -204,7 +224,8 @@ fn end_connection(tables: &Tables, hit: &Hit, second: &End, from: &Record, densi
     if second.kind == Kind::Medium {
         passes *= medium_at(tables, second.medium).sigma_t;
     }
-    (passes, aimed * channel_weights(from.weight).dot(passes))
+    let found = channel_weights(from.weight).dot(passes);
+    (passes, aimed * found * connection_factor(tables, path, hit, second, from, found / density))
 }
 
 /// What the second vertex of `to` brings to the first of `from`, and its density by that.
@@ -213,7 +234,7 @@ fn connect(tables: &Tables, from: &Record, to: &Record) -> (DVec3, f64) {
         return (DVec3::ZERO, 0.0);
     }
     let Some((path, density, aimed)) = begin_connection(tables, from, &to.second) else { return (DVec3::ZERO, 0.0) };
-    end_connection(tables, &super::traverse(tables, &path), &to.second, from, density, aimed)
+    end_connection(tables, &path, &super::traverse(tables, &path), &to.second, from, density, aimed)
 }
 
 /// The phase function of a second vertex for light that arrives along `axis`; 1 on a surface, which scatters alike to all sides.

@@ -1,9 +1,11 @@
 //! Mirror of `shaders/lib/path_state.glsl`: what a path is between two rays, and its flight through media.
 
 use super::bindings::{Medium, Tables};
+use super::equiangular::sample_equiangular;
 use super::light::{alias_keeps, alias_line};
 use super::math::{exp_minus_rgb, minus_log_1m};
 use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
+use super::open_flight::{OpenFlight, open_flight};
 use super::path_share::Record;
 use super::sampler::{group_index, group_seed, half_index, half_seed, lens_key, point_index, set_key, shifted_point};
 use crate::pack::layout::{self, MEDIUM_HEIGHT, MEDIUM_VOXELS};
@@ -70,6 +72,12 @@ pub struct Path {
     pub sharing: u32,
     /// The throughput at the second vertex.
     pub before: DVec3,
+    /// From the first vertex to the lamp that the flight from there may go by, or 0.
+    pub lamp_way: DVec3,
+    /// It goes by [`super::open_flight`], and has not left the medium in which it began.
+    pub open: bool,
+    /// Its length.
+    pub way: f64,
     /// The path goes on behind the ray that is asked for.
     pub alive: bool,
     /// Where the path is; [`NONE`] where boundaries that contradict each other leave no medium.
@@ -143,6 +151,8 @@ pub struct Hit {
     pub tau_rgb: DVec3,
     /// Shadow rays: something is in the way.
     pub blocked: bool,
+    /// Shadow rays: distance of the first boundary.
+    pub first: f64,
     /// Shadow rays: the medium at the end of the ray.
     pub medium: u32,
     /// Shadow rays: fraction of the light that passes masks.
@@ -201,8 +211,8 @@ pub fn medium_at(tables: &Tables, medium: u32) -> &Medium {
     tables.media.get(medium as usize).unwrap_or(&tables.media[0])
 }
 
-/// Whether the flight's distance goes by lamps as well. Not from the first vertex to the second of a path that is shared: its density
-/// must be known from the two alone.
+/// Whether the flight's distance goes by lamps as well, up to what the ray meets. Not from the first vertex to the second of a path that
+/// is shared: see [`open_flight_of`].
 pub fn goes_by_lamps(path: &Path, medium: &Medium) -> bool {
     medium.equiangular > 0.0 && !(path.sharing == 1 && path.depth == 1)
 }
@@ -213,12 +223,36 @@ pub fn flight_end(tables: &Tables, path: &Path) -> f64 {
     if medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT) != 0 {
         return path.far_end;
     }
-    let flight = if goes_by_lamps(path, medium) {
+    let flight = if path.open {
+        path.way
+    } else if goes_by_lamps(path, medium) {
         free_flight(MAX_FLIGHT_TAU, medium.least_sigma_t)
     } else {
         free_flight(path.tau_left, medium.flight_share * medium.sigma_t[path.channel as usize])
     };
     (path.t_min + flight).min(path.far_end)
+}
+
+/// The flight from the first vertex of a path that is shared to the second, by a lamp.
+pub fn open_flight_of(path: &Path, medium: &Medium) -> OpenFlight {
+    open_flight(medium, channel_weights(path.throughput), path.origin, path.direction, path.lamp_way)
+}
+
+/// Whether such a flight goes by a lamp as well, and then how far it gets.
+fn begin_open_flight(tables: &Tables, path: &mut Path, u: f64) {
+    path.open = false;
+    if path.sharing != 1 || path.depth != 1 {
+        return;
+    }
+    let medium = medium_at(tables, path.medium);
+    let flight = open_flight_of(path, medium);
+    path.open = flight.share > 0.0;
+    if path.open && u < flight.share {
+        path.way = sample_equiangular(&flight.stretch, u / flight.share);
+    } else if path.open {
+        path.tau_left = minus_log_1m((u - flight.share) / (1.0 - flight.share));
+        path.way = free_flight(path.tau_left, medium.sigma_t[path.channel as usize]);
+    }
 }
 
 /// A new segment along `path.direction`: its flight from two random numbers.
@@ -230,6 +264,7 @@ pub fn begin_segment(tables: &Tables, path: &mut Path, u: DVec2) {
     path.tau_left = minus_log_1m(u.x);
     path.tau_rgb = DVec3::ZERO;
     path.channel = sample_channel(channel_weights(path.throughput), u.y);
+    begin_open_flight(tables, path, u.x);
     path.collisions = 0;
     path.tau_mean = DVec3::ZERO;
     path.segment_weights = channel_weights(path.throughput);
