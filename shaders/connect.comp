@@ -28,7 +28,7 @@ void main() {
     End first, second;
     vec3 weight = vec3(0.0);
     float density = 0.0, aimed = 1.0;
-    Aim aim = Aim(vec3(0.0), 0.0, 0.0, 0.0);
+    Pivot pivot = Pivot(vec3(0.0), 0.0); // what the second vertex was found by
     bool asked = false;
     Path path;
     path.shadow = true;
@@ -38,7 +38,7 @@ void main() {
     Walk walk = Walk(0u, 0u, 0u);
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {
-            vec4 found = asked ? end_connection(path, hit, first, second, aim, weight, density, aimed) : vec4(0.0);
+            vec4 found = asked ? end_connection(path, hit, first, second, pivot, weight, density, aimed) : vec4(0.0);
             if (next > 0u) {
                 store_pair(pairs, own, to, found);
             }
@@ -65,11 +65,6 @@ void main() {
                 first.kind = all(lessThan(origin + place, size)) ? first.kind : END_NONE;
                 vec4 left = SAMPLE(record + 2u);
                 path.left = uint(left.x) | uint(left.y) << 16u;
-                if (HAS_EQUIANGULAR) {
-                    vec4 goes_by = SAMPLE(record + AIM);
-                    float reach = length(goes_by.xyz);
-                    aim = Aim(goes_by.xyz / max(reach, 1e-30), reach, goes_by.w, 0.0);
-                }
                 if (HAS_CHROMATIC) {
                     weight = SAMPLE(record + RECORD_WEIGHT).xyz;
                 }
@@ -81,7 +76,11 @@ void main() {
             if (first.kind != END_NONE && all(lessThan(origin + other, size))) {
                 uint record = record_of(first_slot + (other.y * TILE + other.x) * count + of_pixel);
                 second = load_end(record, 1u);
-                asked = second.kind != END_NONE && begin_connection(path, first, second, aim, density, aimed);
+                if (HAS_EQUIANGULAR) {
+                    vec4 lamp = SAMPLE(record + PIVOT);
+                    pivot = Pivot(lamp.xyz, lamp.w);
+                }
+                asked = second.kind != END_NONE && begin_connection(path, first, second, pivot, density, aimed);
                 if (asked) {
                     begin_ray(path, ray, grid, walk, hit);
                 }

@@ -49,6 +49,19 @@ fn cases(side: u32) -> Vec<(&'static str, Scene)> {
     let small = scenes::quad(v(0.3, 0.2, 0.0), DVec3::X * 0.1, DVec3::Z * 0.1);
     lantern.shapes.push(Shape::lamp("lamp", small, v(90.0, 80.0, 70.0)));
     lantern.lights.push(Light::Constant { radiance: v(0.1, 0.2, 0.3) });
+    // Lamps in a coloured fog whose boundaries flights and connections leave: into the clear, and into other fog.
+    let mut harbour = Scene::new(scenes::camera(4.0), Film::new(side, side));
+    let colored = |sigma_t: DVec3| Medium { sigma_t, ..scenes::gray(1.0, 0.8, 0.4) };
+    let [thin, thick] = [v(0.2, 0.4, 0.6), v(3.0, 2.0, 1.0)].map(|sigma_t| harbour.add_medium(colored(sigma_t)));
+    let bank = scenes::cuboid(glam::DMat4::from_scale(v(1.3, 0.7, 1.0)));
+    harbour.shapes.push(Shape::boundary("bank", bank, thin));
+    let core = glam::DMat4::from_translation(v(-0.6, 0.0, 0.2)) * glam::DMat4::from_scale(DVec3::splat(0.3));
+    harbour.shapes.push(Shape::boundary("core", scenes::cuboid(core), thick));
+    let quay = scenes::quad(v(-3.0, -0.9, 3.0), DVec3::X * 6.0, DVec3::NEG_Z * 6.0);
+    harbour.shapes.push(Shape::diffuse("quay", quay, v(0.8, 0.5, 0.3)));
+    harbour.lights.push(Light::Point { position: v(0.7, 0.3, 0.2), intensity: v(0.5, 0.4, 0.3) });
+    let light = scenes::quad(v(-0.2, 0.5, 0.0), DVec3::X * 0.2, DVec3::Z * 0.2);
+    harbour.shapes.push(Shape::lamp("lamp", light, v(20.0, 30.0, 40.0)));
     // Shading normals, first and second: a floor that leans as far as one can without a gap in what it reflects, and a ball of few facets.
     let mut smooth = Scene::new(scenes::camera(4.0), Film::new(side, side));
     scenes::walls(&mut smooth);
@@ -67,6 +80,7 @@ fn cases(side: u32) -> Vec<(&'static str, Scene)> {
         ("smooth", smooth),
         ("glare", glare),
         ("lantern", lantern),
+        ("harbour", harbour),
         ("wide filter", wide),
         ("eager roulette", eager),
         ("absorbing", absorbing(v(2.0, 2.0, 2.0))),
@@ -150,7 +164,7 @@ fn sharing_changes_no_expectation() {
         }
         let sharers = [4, 8][index / 2 % 2];
         // Two that take more samples to tell right from wrong.
-        let samples = if matches!(name, "glare" | "lantern") { 256 } else { 24 };
+        let samples = if matches!(name, "glare" | "lantern" | "harbour") { 256 } else { 24 };
         let truth = tiles(&images::on_device(&pack(&scene, 4), samples));
         let image = tiles(&images::reconstructed(&shared(&pack(&scene, 5), sharers), SIDE, samples));
         let (z, coarsest) = differences(&image, &truth);

@@ -121,13 +121,17 @@ void scatter(inout Path path, Vertex vertex) {
     if (!path.alive) {
         return;
     }
-    vec4 u = sample_vertex(path);
+    vec4 u = vertex_numbers(path, path.segment);
     float lobe = HAS_LOBES || HAS_PHASES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
-    Aim aim = find_aim(path, vertex);
+    Pivot pivot = Pivot(vec3(0.0), 0.0);
+    if (HAS_EQUIANGULAR) {
+        pivot = find_pivot(path, path.segment + 1u);
+    }
+    Aim aim = find_aim(path, vertex, pivot);
     float scattered;
     BsdfSample next = sample_next(vertex, aim, u.zw, lobe, scattered);
     if (HAS_SHARING && HAS_EQUIANGULAR) {
-        share_aim(path, vertex, aim, next, scattered);
+        share_aim(path, vertex, pivot, aim, next, scattered);
     }
     path.scattered_pdf = weighing_pdf(path, vertex, scattered);
     float pdf = is_common(path, vertex) ? aimed_pdf(aim, path.scattered_pdf, next.direction) : next.pdf;

@@ -7,6 +7,12 @@
 // Sets of random numbers that choose what a segment's sampling goes by: its direction, and then equiangular distances.
 const uint PIVOT_SET = 0x40000000u;
 
+// A point of a lamp, by which a segment goes.
+struct Pivot {
+    vec3 point;
+    float area; // of the lamp
+};
+
 // Share of directions that go by a small lamp...
 const float AIMED_SHARE = 0.25;
 // ...and half as many by one whose area is the squared distance over this: what a broad lamp brings varies little with direction.
@@ -14,7 +20,6 @@ const float BROAD = 8.0;
 
 struct Aim {
     vec3 axis;      // to a point of the lamp
-    float reach;    // the distance to it
     float share;    // probability of directions by the lamp; 0 where only scattering counts
     float u;        // decides between the two
 };
@@ -30,22 +35,31 @@ vec3 light_pivot(Light light, vec2 u) {
     return pivot;
 }
 
-// What a vertex's next direction goes by. Glass is left to its own: a direction through it is not seen from the other side.
-Aim find_aim(Path path, Vertex vertex) {
-    Aim aim = Aim(vec3(0.0, 0.0, 1.0), 0.0, 0.0, 0.0);
-    bool may = vertex.in_medium || !HAS_DIELECTRIC || (vertex.surface.flags & SURFACE_ORIENTED) == 0u;
-    if (HAS_EQUIANGULAR && may && MEDIUM(valid_medium(path.medium)).equiangular > 0.0) {
-        // The next segment's numbers: its distances go by the same point.
-        vec4 v = sample_set(path, PIVOT_SET + path.segment + 1u);
-        Light light = LIGHT(choose_light(v.x));
-        vec3 way = light_pivot(light, v.zw) - vertex.point;
-        float squared = dot(way, way);
-        if (squared > 0.0) {
-            float reach = sqrt(squared);
-            aim = Aim(way / reach, reach, AIMED_SHARE * squared / (squared + BROAD * light.area), v.y);
-        }
+// What the direction of a segment goes by, and its distances. The lamp is the one that the vertex at its end samples: each lamp's light is
+// found where the path looks for it, and none by paths that went by another one, which would come near it seldom and bring much.
+Pivot find_pivot(Path path, uint segment) {
+    float u = vertex_numbers(path, segment).x;
+    Light light = LIGHT(choose_light(u));
+    return Pivot(light_pivot(light, sample_set(path, PIVOT_SET + segment).zw), light.area);
+}
+
+// What directions from a point in a medium go by.
+Aim aim_at(Pivot pivot, vec3 point, Medium medium, float u) {
+    vec3 way = pivot.point - point;
+    float squared = dot(way, way);
+    if (medium.equiangular == 0.0 || squared == 0.0) {
+        return Aim(vec3(0.0, 0.0, 1.0), 0.0, u);
     }
-    return aim;
+    return Aim(way * inversesqrt(squared), AIMED_SHARE * squared / (squared + BROAD * pivot.area), u);
+}
+
+// What a vertex's next direction goes by. Glass is left to its own: a direction through it is not seen from the other side.
+Aim find_aim(Path path, Vertex vertex, Pivot pivot) {
+    bool may = HAS_EQUIANGULAR && (vertex.in_medium || !HAS_DIELECTRIC || (vertex.surface.flags & SURFACE_ORIENTED) == 0u);
+    if (!may) {
+        return Aim(vec3(0.0, 0.0, 1.0), 0.0, 0.0);
+    }
+    return aim_at(pivot, vertex.point, MEDIUM(valid_medium(path.medium)), sample_set(path, PIVOT_SET + path.segment + 1u).y);
 }
 
 // Density of a direction that scattering has with the density `pdf`, by both ways to choose it.

@@ -61,10 +61,8 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
     }
     float scatters = one_minus_exp_minus(sigma * way);
     float u = min(one_minus_exp_minus(path.tau_left) / scatters, 0.99999994);
-    vec4 v = sample_set(path, PIVOT_SET + path.segment);
-    Light light = LIGHT(choose_light(v.x));
     float share = medium.equiangular;
-    Stretch stretch = stretch_seen_from(light_pivot(light, v.zw), path.origin, path.direction, path.t_min, t_end);
+    Stretch stretch = stretch_seen_from(find_pivot(path, path.segment).point, path.origin, path.direction, path.t_min, t_end);
     float s;
     if (u < share) {
         s = sample_equiangular(stretch, u / share);

@@ -26,7 +26,7 @@ const uint END_MEDIUM = 2u;
 const uint SECOND = 4u; // the second vertex
 const uint SENT = 6u;   // what it sends: see Sent
 const uint BASE = 11u;  // radiance that came before it
-const uint AIM = 12u;   // what the first vertex's direction went by: the way to a lamp, and its share
+const uint PIVOT = 12u; // what the first vertex's direction and flight went by
 const uint NORMALS = 13u; // where shading normals are: the geometric ones of the first and the second vertex
 
 const uvec2 SHARE_SIZE = uvec2(2u, SHARERS == 4u ? 2u : 4u);
@@ -152,13 +152,13 @@ void share_vertex(inout Path path, inout Vertex vertex) {
     }
 }
 
-// Keeps what the directions of the first two vertices went by. At a second one in a medium it takes part in the density of each path that
+// Keeps what the segments behind the first two vertices went by. At a second one in a medium it takes part in the density of each path that
 // may come there, so the path goes on as if scattering alone had chosen its direction, which has the density `scattered`.
-void share_aim(inout Path path, Vertex vertex, Aim aim, inout BsdfSample next, float scattered) {
+void share_aim(inout Path path, Vertex vertex, Pivot pivot, Aim aim, inout BsdfSample next, float scattered) {
     uint record = record_of(path.slot);
     if (path.sharing == 1u && path.depth == 1u) {
-        path.lamp_way = aim.axis * aim.reach;
-        store_sample(record + AIM, vec4(path.lamp_way, aim.share));
+        path.lamp_way = pivot.point - vertex.point;
+        store_sample(record + PIVOT, vec4(pivot.point, pivot.area));
     } else if (is_common(path, vertex) && aim.share > 0.0 && scattered > 0.0) {
         SAMPLE(record + 2u).zw = vec2(1.0 - aim.share, aimed_pdf(aim, 0.0, next.direction));
         float ratio = scattered / next.pdf;
@@ -198,8 +198,8 @@ Sent load_sent(uint record) {
 }
 
 // Asks for the ray from a first vertex to a second one. Returns whether the first could have found the second: `density` is that of the
-// place by scattering, without what lies on the way, and `aimed` the density with the first vertex's aim over that.
-bool begin_connection(inout Path path, End first, End second, Aim aim, out float density, out float aimed) {
+// place by scattering, without what lies on the way, and `aimed` the density with directions past the lamp over that.
+bool begin_connection(inout Path path, End first, End second, Pivot pivot, out float density, out float aimed) {
     vec3 way = second.point - first.point;
     vec3 begin = first.point, end = second.point;
     if (first.kind == END_SURFACE) {
@@ -227,7 +227,7 @@ bool begin_connection(inout Path path, End first, End second, Aim aim, out float
     } else {
         density = HAS_HENYEY_GREENSTEIN ? eval_henyey_greenstein(MEDIUM(first.medium).g, first.axis, path.direction) : INV_4PI;
     }
-    aimed = HAS_EQUIANGULAR ? aimed_pdf(aim, density, path.direction) / density : 1.0;
+    aimed = HAS_EQUIANGULAR ? aimed_pdf(aim_at(pivot, first.point, MEDIUM(first.medium), 0.0), density, path.direction) / density : 1.0;
     if (second.kind == END_SURFACE) {
         density *= max(-dot(second.normal, path.direction), 0.0);
         density = HAS_SHADING_NORMALS && dot(second.axis, path.direction) >= 0.0 ? 0.0 : density;
@@ -237,9 +237,9 @@ bool begin_connection(inout Path path, End first, End second, Aim aim, out float
 }
 
 // The density of a flight that ends at the second vertex, over that of a free flight, which is `free` for a density of 1.
-float connection_factor(Path path, Hit hit, End first, End second, Aim aim, vec3 weights, float free) {
+float connection_factor(Path path, Hit hit, End first, End second, Pivot pivot, vec3 weights, float free) {
     Medium medium = MEDIUM(first.medium);
-    OpenFlight flight = open_flight(medium, weights, path.origin, path.direction, aim.axis * aim.reach);
+    OpenFlight flight = open_flight(medium, weights, path.origin, path.direction, pivot.point - first.point);
     bool leaves = hit.first < path.t_max;
     float way = min(hit.first, path.t_max);
     bool ends = !leaves && second.kind == END_MEDIUM;
@@ -247,7 +247,7 @@ float connection_factor(Path path, Hit hit, End first, End second, Aim aim, vec3
 }
 
 // What a connection whose ray has been traced brings in each channel, and its density by the flight of the first vertex, which chooses one.
-vec4 end_connection(Path path, Hit hit, End first, End second, Aim aim, vec3 weight, float density, float aimed) {
+vec4 end_connection(Path path, Hit hit, End first, End second, Pivot pivot, vec3 weight, float density, float aimed) {
     if (hit.blocked) {
         return vec4(0.0);
     }
@@ -258,7 +258,7 @@ vec4 end_connection(Path path, Hit hit, End first, End second, Aim aim, vec3 wei
     }
     vec3 weights = HAS_CHROMATIC ? channel_weights(weight) : vec3(0.0);
     float found = HAS_CHROMATIC ? dot(weights, passes) : passes.x;
-    float factor = HAS_EQUIANGULAR ? aimed * connection_factor(path, hit, first, second, aim, weights, found / density) : 1.0;
+    float factor = HAS_EQUIANGULAR ? aimed * connection_factor(path, hit, first, second, pivot, weights, found / density) : 1.0;
     return vec4(passes, factor * found);
 }
 

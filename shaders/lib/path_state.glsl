@@ -123,9 +123,9 @@ vec4 sample_camera(Path path) {
 }
 
 // The numbers of the vertex at the end of a segment.
-vec4 sample_vertex(Path path) {
-    vec4 own = sample_set(path, 2u * path.segment + 1u);
-    if (HAS_SHARING && path.segment == 0u) {
+vec4 vertex_numbers(Path path, uint segment) {
+    vec4 own = sample_set(path, 2u * segment + 1u);
+    if (HAS_SHARING && segment == 0u) {
         // Light that the first vertex samples is not shared, and better spread over the whole render.
         own.xy = numbers_of_set(params.seed, path.pixel, 1u, path.sample_index).xy;
     }

@@ -10,7 +10,7 @@ use super::math::{exp_minus_rgb, max_component, minus_log_1m, orthonormal_frame}
 use super::medium::{channel_weights, sample_channel};
 use super::open_flight::{mean_passage, open_factor};
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
-use super::path_aim::{aimed_pdf, find_aim, is_common, sample_next, weighing_pdf};
+use super::path_aim::{aimed_pdf, find_aim, find_pivot, is_common, sample_next, weighing_pdf};
 use super::path_flight::{
     albedo_factor, end_flight, end_height_flight, end_voxel_flight, enter_medium, flight_point, flight_side, free_way,
     near_distance, pass_medium, rare_collision_weight, rare_passage_weight,
@@ -21,7 +21,7 @@ use super::path_share::{share_aim, share_ended, share_light, share_vertex};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
     INFINITE_DISTANCE, begin_segment, flight_end, medium_at, open_flight_of, sample_camera, sample_lens, sample_set,
-    sample_vertex, survived_throughput,
+    survived_throughput, vertex_numbers,
 };
 use super::path_surface::{
     Place, apply_textures, opacity_at, pane_depth, shading_normal, share_at, surface_tangent, turn_frame,
@@ -138,11 +138,12 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     if !path.alive {
         return;
     }
-    let u = sample_vertex(tables, path);
+    let u = vertex_numbers(tables, path, path.segment);
     let lobe = sample_set(tables, path, 2 * path.segment + 2).y;
-    let aim = find_aim(tables, path, vertex);
+    let pivot = find_pivot(tables, path, path.segment + 1);
+    let aim = find_aim(tables, path, vertex, &pivot);
     let (mut next, scattered) = sample_next(tables, vertex, &aim, u.zw(), lobe);
-    share_aim(path, vertex, &aim, &mut next, scattered);
+    share_aim(path, vertex, &pivot, &aim, &mut next, scattered);
     path.scattered_pdf = weighing_pdf(path, vertex, scattered);
     let pdf = if is_common(path, vertex) { aimed_pdf(&aim, path.scattered_pdf, next.direction) } else { next.pdf };
     path.point = vertex.point;

@@ -1,9 +1,9 @@
 //! Mirror of `shaders/lib/path_aim.glsl`: where a path goes next, by scattering or past a lamp.
 
-use super::bindings::{Light, Tables};
+use super::bindings::{Light, Medium, Tables};
 use super::bsdf::BsdfSample;
 use super::light::plane_light_point;
-use super::path_state::{Path, choose_light, medium_at, sample_set};
+use super::path_state::{Path, choose_light, medium_at, sample_set, vertex_numbers};
 use super::path_vertex::{Vertex, eval_scattering, sample_scattering};
 use super::toward_light::{sample_toward_light, toward_light_pdf};
 use crate::pack::layout::{LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_TRIANGLE, SURFACE_ORIENTED};
@@ -18,13 +18,20 @@ const AIMED_SHARE: f64 = 0.25;
 /// ...and half as many by one whose area is the squared distance over this: what a broad lamp brings varies little with direction.
 const BROAD: f64 = 8.0;
 
+/// A point of a lamp, by which a segment goes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pivot {
+    /// Where it is.
+    pub point: DVec3,
+    /// Of the lamp.
+    pub area: f64,
+}
+
 /// What a vertex's next direction goes by.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Aim {
     /// To a point of the lamp.
     pub axis: DVec3,
-    /// The distance to it.
-    pub reach: f64,
     /// Probability of directions by the lamp; 0 where only scattering counts.
     pub share: f64,
     /// Decides between the two.
@@ -39,22 +46,30 @@ pub fn light_pivot(light: &Light, u: DVec2) -> DVec3 {
     light.origin + offset
 }
 
-/// The aim of a vertex; glass is left to its own.
-pub fn find_aim(tables: &Tables, path: &Path, vertex: &Vertex) -> Aim {
-    let mut aim = Aim { axis: DVec3::Z, reach: 0.0, share: 0.0, u: 0.0 };
-    let may = vertex.in_medium || vertex.surface.flags & SURFACE_ORIENTED == 0;
-    if may && medium_at(tables, path.medium).equiangular > 0.0 {
-        let mut v = sample_set(tables, path, PIVOT_SET + path.segment + 1);
-        let light = &tables.lights[choose_light(tables, &mut v.x) as usize];
-        let way = light_pivot(light, v.zw()) - vertex.point;
-        let squared = way.length_squared();
-        if squared > 0.0 {
-            let share = AIMED_SHARE * squared / (squared + BROAD * light.area);
-            let reach = squared.sqrt();
-            aim = Aim { axis: way / reach, reach, share, u: v.y };
-        }
+/// What the direction of a segment goes by, and its distances: by the lamp that the vertex at its end samples.
+pub fn find_pivot(tables: &Tables, path: &Path, segment: u32) -> Pivot {
+    let mut u = vertex_numbers(tables, path, segment).x;
+    let light = &tables.lights[choose_light(tables, &mut u) as usize];
+    Pivot { point: light_pivot(light, sample_set(tables, path, PIVOT_SET + segment).zw()), area: light.area }
+}
+
+/// What directions from a point in a medium go by.
+pub fn aim_at(pivot: &Pivot, point: DVec3, medium: &Medium, u: f64) -> Aim {
+    let way = pivot.point - point;
+    let squared = way.length_squared();
+    if medium.equiangular == 0.0 || squared == 0.0 {
+        return Aim { axis: DVec3::Z, share: 0.0, u };
     }
-    aim
+    Aim { axis: way / squared.sqrt(), share: AIMED_SHARE * squared / (squared + BROAD * pivot.area), u }
+}
+
+/// The aim of a vertex; glass is left to its own.
+pub fn find_aim(tables: &Tables, path: &Path, vertex: &Vertex, pivot: &Pivot) -> Aim {
+    if !vertex.in_medium && vertex.surface.flags & SURFACE_ORIENTED != 0 {
+        return Aim::default();
+    }
+    let u = sample_set(tables, path, PIVOT_SET + path.segment + 1).y;
+    aim_at(pivot, vertex.point, medium_at(tables, path.medium), u)
 }
 
 /// Density of a direction that scattering has with the density `pdf`, by both ways to choose it.

@@ -9,14 +9,12 @@ use super::grid::{
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
 use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight, survival_weight};
 use super::open_flight::open_factor;
-use super::path_aim::{PIVOT_SET, light_pivot};
-use super::path_state::{
-    FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, choose_light, goes_by_lamps, medium_at, open_flight_of, sample_set,
-};
+use super::path_aim::find_pivot;
+use super::path_state::{FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, goes_by_lamps, medium_at, open_flight_of};
 use super::ray::{offset_distance, vertex_clearance};
 use super::sampler::set_key;
 use crate::pack::layout::{MEDIUM_ALBEDO_GRID, MEDIUM_EMISSION_GRID, MEDIUM_HEIGHT, MEDIUM_VOXELS, PRIMITIVE_SPHERE};
-use glam::{DVec3, Vec4Swizzles};
+use glam::DVec3;
 
 /// The end of a flight.
 #[derive(Clone, Copy, Debug)]
@@ -73,10 +71,9 @@ pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, sur
     }
     let scatters = one_minus_exp_minus(sigma * length);
     let u = (one_minus_exp_minus(path.tau_left) / scatters).min(0.999_999_94);
-    let mut v = sample_set(tables, path, PIVOT_SET + path.segment);
-    let light = &tables.lights[choose_light(tables, &mut v.x) as usize];
     let share = medium.equiangular;
-    let stretch = stretch_seen_from(light_pivot(light, v.zw()), path.origin, path.direction, path.t_min, t_end);
+    let pivot = find_pivot(tables, path, path.segment);
+    let stretch = stretch_seen_from(pivot.point, path.origin, path.direction, path.t_min, t_end);
     let s = if u < share {
         sample_equiangular(&stretch, u / share)
     } else {

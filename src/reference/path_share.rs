@@ -6,7 +6,7 @@ use super::bsdf::BsdfSample;
 use super::math::{exp_minus_rgb, max_component};
 use super::medium::channel_weights;
 use super::open_flight::{mean_passage, open_factor, open_flight};
-use super::path_aim::{Aim, aimed_pdf, is_common};
+use super::path_aim::{Aim, Pivot, aim_at, aimed_pdf, is_common};
 use super::path_state::{Hit, NONE, Path, medium_at};
 use super::path_vertex::Vertex;
 use super::phase::eval_henyey_greenstein;
@@ -53,8 +53,8 @@ pub struct Record {
     pub first: End,
     /// The triangle on which it lies, which its rays cannot meet again.
     pub left: u32,
-    /// What its direction went by.
-    pub aim: Aim,
+    /// What its direction and its flight went by.
+    pub pivot: Pivot,
     /// What the radiance that it scatters is multiplied with.
     pub weight: DVec3,
     /// The second vertex.
@@ -118,12 +118,12 @@ pub fn share_vertex(tables: &Tables, path: &mut Path, vertex: &mut Vertex) {
     }
 }
 
-/// Keeps what the directions of the first two vertices went by. After a second one in a medium the path goes on as if scattering alone
+/// Keeps what the segments behind the first two vertices went by. After a second one in a medium the path goes on as if scattering alone
 /// had chosen its direction, which has the density `scattered`.
-pub fn share_aim(path: &mut Path, vertex: &Vertex, aim: &Aim, next: &mut BsdfSample, scattered: f64) {
+pub fn share_aim(path: &mut Path, vertex: &Vertex, pivot: &Pivot, aim: &Aim, next: &mut BsdfSample, scattered: f64) {
     if path.sharing == 1 && path.depth == 1 {
-        path.record.aim = *aim;
-        path.lamp_way = aim.axis * aim.reach;
+        path.record.pivot = *pivot;
+        path.lamp_way = pivot.point - vertex.point;
     } else if is_common(path, vertex) && aim.share > 0.0 && scattered > 0.0 {
         path.record.unaimed = 1.0 - aim.share;
         path.record.aimed = aimed_pdf(aim, 0.0, next.direction);
@@ -154,8 +154,8 @@ pub fn share_rest(path: &mut Path) -> DVec3 {
 }
 
 /// The ray from a first vertex to a second one, the density of the place by scattering without what lies on the way, and that with the
-/// first vertex's aim over it; none if the first could not have found the second.
-fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(Path, f64, f64)> {
+/// directions past the lamp over it; none if the first could not have found the second.
+fn begin_connection(tables: &Tables, record: &Record, second: &End, pivot: &Pivot) -> Option<(Path, f64, f64)> {
     let first = &record.first;
     let way = second.point - first.point;
     let (mut begin, mut end) = (first.point, second.point);
@@ -174,7 +174,8 @@ fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(P
         Kind::Surface => first.axis.dot(direction).max(0.0) / PI,
         _ => eval_henyey_greenstein(medium_at(tables, first.medium).g, first.axis, direction),
     };
-    let aimed = aimed_pdf(&record.aim, density, direction) / density;
+    let aim = aim_at(pivot, first.point, medium_at(tables, first.medium), 0.0);
+    let aimed = aimed_pdf(&aim, density, direction) / density;
     if second.kind == Kind::Surface {
         let seen = second.axis.dot(direction) < 0.0;
         density *= if seen { (-second.normal.dot(direction)).max(0.0) } else { 0.0 };
@@ -198,11 +199,11 @@ fn begin_connection(tables: &Tables, record: &Record, second: &End) -> Option<(P
 }
 
 /// The density of a flight that ends at the second vertex, over that of a free flight, which is `free` for a density of 1.
-fn connection_factor(tables: &Tables, path: &Path, hit: &Hit, second: &End, from: &Record, free: f64) -> f64 {
+fn connection_factor(tables: &Tables, path: &Path, hit: &Hit, to: &Record, from: &Record, free: f64) -> f64 {
     let (medium, weights) = (medium_at(tables, from.first.medium), channel_weights(from.weight));
-    let flight = open_flight(medium, weights, path.origin, path.direction, from.aim.axis * from.aim.reach);
+    let flight = open_flight(medium, weights, path.origin, path.direction, to.pivot.point - from.first.point);
     let way = hit.first.min(path.t_max);
-    let ends = hit.first >= path.t_max && second.kind == Kind::Medium;
+    let ends = hit.first >= path.t_max && to.second.kind == Kind::Medium;
     let free = if ends { free } else { mean_passage(weights, medium.sigma_t * way) };
     open_factor(&flight, way, ends, free)
 }
@@ -212,7 +213,7 @@ fn end_connection(
     tables: &Tables,
     path: &Path,
     hit: &Hit,
-    second: &End,
+    to: &Record,
     from: &Record,
     density: f64,
     aimed: f64,
@@ -221,11 +222,11 @@ fn end_connection(
         return (DVec3::ZERO, 0.0);
     }
     let mut passes = density * exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
-    if second.kind == Kind::Medium {
-        passes *= medium_at(tables, second.medium).sigma_t;
+    if to.second.kind == Kind::Medium {
+        passes *= medium_at(tables, to.second.medium).sigma_t;
     }
     let found = channel_weights(from.weight).dot(passes);
-    (passes, aimed * found * connection_factor(tables, path, hit, second, from, found / density))
+    (passes, aimed * found * connection_factor(tables, path, hit, to, from, found / density))
 }
 
 /// What the second vertex of `to` brings to the first of `from`, and its density by that.
@@ -233,8 +234,10 @@ fn connect(tables: &Tables, from: &Record, to: &Record) -> (DVec3, f64) {
     if from.first.kind == Kind::None || to.second.kind == Kind::None {
         return (DVec3::ZERO, 0.0);
     }
-    let Some((path, density, aimed)) = begin_connection(tables, from, &to.second) else { return (DVec3::ZERO, 0.0) };
-    end_connection(tables, &path, &super::traverse(tables, &path), &to.second, from, density, aimed)
+    let Some((path, density, aimed)) = begin_connection(tables, from, &to.second, &to.pivot) else {
+        return (DVec3::ZERO, 0.0);
+    };
+    end_connection(tables, &path, &super::traverse(tables, &path), to, from, density, aimed)
 }
 
 /// The phase function of a second vertex for light that arrives along `axis`; 1 on a surface, which scatters alike to all sides.
