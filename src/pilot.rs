@@ -28,6 +28,8 @@ use rayon::prelude::*;
 
 /// Paths of each block, where only sharing is to be decided.
 const FEW_PATHS_PER_BLOCK: u32 = 4;
+/// Where surfaces have lobes: the light of mirrors and glass on others, which cannot be shared, is rare and bright. A few paths do not see it.
+const MANY_PATHS_PER_BLOCK: u32 = 64;
 /// The part of a render's variance before the second vertex is stratified so much better than that of the pilot.
 const DIRECT_STRATIFIED: f64 = 4.0;
 /// What a group of M pixels shares has the variance of so many times M to this power paths of one's own, as the image is put together
@@ -128,7 +130,11 @@ pub fn run(packed: &mut Packed, sharing: bool) {
 }
 
 fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
-    let rounds = if roulette { PATHS_PER_BLOCK } else { FEW_PATHS_PER_BLOCK };
+    let rounds = match sharing && packed.features.lobes() {
+        true => MANY_PATHS_PER_BLOCK,
+        false if roulette => PATHS_PER_BLOCK,
+        false => FEW_PATHS_PER_BLOCK,
+    };
     let mut tables = Tables::new(packed);
     tables.params.seed = SEED;
     let params = &packed.params;

@@ -263,6 +263,11 @@ impl Features {
         }
     }
 
+    /// Whether a surface sends more light to some sides than to others.
+    pub fn lobes(&self) -> bool {
+        self.dielectric || self.conductor || self.plastic || self.principled
+    }
+
     /// The text of `features.glsl`.
     pub fn glsl(&self) -> String {
         let switches = [
@@ -292,7 +297,7 @@ impl Features {
             ("HAS_DIELECTRIC", self.dielectric),
             ("HAS_CONDUCTOR", self.conductor),
             ("HAS_PLASTIC", self.plastic),
-            ("HAS_LOBES", self.dielectric || self.conductor || self.plastic || self.principled),
+            ("HAS_LOBES", self.lobes()),
             ("HAS_ROUGH_PLASTIC", self.rough_plastic),
             ("HAS_PRINCIPLED", self.principled),
             ("HAS_TEXTURES", self.textures),
