@@ -5,6 +5,7 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "lib/bindings.glsl"
 #include "lib/path_share.glsl"
+#include "lib/path_shadow.glsl"
 #include "lib/path_walk.glsl"
 #include "lib/film.glsl"
 
@@ -38,6 +39,10 @@ void main() {
     Walk walk = Walk(0u, 0u, 0u);
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {
+            if (HAS_GRIDS && asked && !hit.blocked && advance_shadow(path, hit, true)) {
+                begin_ray(path, ray, grid, walk, hit);
+                continue;
+            }
             vec4 found = asked ? end_connection(path, hit, first, second, pivot, weight, density, aimed) : vec4(0.0);
             if (next > 0u) {
                 store_pair(pairs, own, to, found);
@@ -82,9 +87,14 @@ void main() {
                 }
                 asked = second.kind != END_NONE && begin_connection(path, first, second, pivot, density, aimed);
                 if (asked) {
+                    if (HAS_GRIDS) {
+                        path.pixel = (origin.y + place.y + params.crop_y) * params.film_width + origin.x + place.x + params.crop_x;
+                        path.sample_index = push.work.first_sample + of_pixel;
+                        path.segment = CONNECTION_SEGMENTS + to;
+                    }
                     begin_ray(path, ray, grid, walk, hit);
                 }
-                if (!HAS_CHROMATIC && to == own) {
+                if (!HAS_CHROMATIC && !HAS_GRIDS && to == own) {
                     // The path has been there.
                     walk = Walk(0u, 0u, 0u);
                     hit.blocked = false;

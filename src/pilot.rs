@@ -20,15 +20,17 @@ use crate::pack::Packed;
 use crate::pack::layout::PILOT_CELLS;
 use crate::reference::bindings::Tables;
 use crate::reference::outlook::outlook_cell;
-use crate::reference::path::{arriving_throughput, path_answer_seen, path_start};
-use crate::reference::path_share::can_share;
+use crate::reference::path::{Path, arriving_throughput, path_answer_seen, path_start};
+use crate::reference::path_share::{End, Record, can_share, end_of, passage_weight};
+use crate::reference::path_state::NONE;
 use crate::reference::traverse;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Paths of each block, where only sharing is to be decided.
 const FEW_PATHS_PER_BLOCK: u32 = 4;
-/// Where surfaces have lobes: the light of mirrors and glass on others, which cannot be shared, is rare and bright. A few paths do not see it.
+/// Where surfaces have lobes, the light of mirrors and glass on others, which cannot be shared, is rare and bright, and so are the weights of
+/// flights through voxels: a few paths do not see them.
 const MANY_PATHS_PER_BLOCK: u32 = 64;
 /// The part of a render's variance before the second vertex is stratified so much better than that of the pilot.
 const DIRECT_STRATIFIED: f64 = 4.0;
@@ -94,6 +96,8 @@ struct Trail {
     direct: DVec3,
     /// The first two vertices can be shared.
     shares: bool,
+    /// What the flight between them would weigh, if they were.
+    weight: f64,
     rays: f64,
     vertices: Vec<Vertex>,
 }
@@ -130,7 +134,7 @@ pub fn run(packed: &mut Packed, sharing: bool) {
 }
 
 fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
-    let rounds = match sharing && packed.features.lobes() {
+    let rounds = match sharing && (packed.features.lobes() || packed.features.voxels) {
         true => MANY_PATHS_PER_BLOCK,
         false if roulette => PATHS_PER_BLOCK,
         false => FEW_PATHS_PER_BLOCK,
@@ -148,10 +152,12 @@ fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
     }
 }
 
-/// Whether the kernels can connect paths of different pixels in such a scene: light through voxels, masks and panes is known by chance only.
+/// Whether the kernels can connect paths of different pixels in such a scene: light through masks and panes is known by chance only, and the
+/// density of flights through fields only where all media are gray and dark, and no distances go by lamps.
 pub fn can_share_paths(packed: &Packed) -> bool {
     let features = &packed.features;
-    features.light_sampling && !features.grids && !features.masks && !features.panes
+    let fields = features.grids && (features.chromatic || features.equiangular || features.emission);
+    features.light_sampling && !fields && !features.masks && !features.panes
 }
 
 /// Follows one path for each block, and again until there are enough. The order of the result does not depend on the threads.
@@ -183,12 +189,16 @@ fn follow_one(tables: &Tables, blocks: Blocks, block: u32, round: u32) -> Trail 
     let mut rays = 0;
     // With what the path had gathered, and after how many rays.
     let mut vertices: Vec<Vertex> = Vec::new();
-    let mut shares = 0;
+    let mut ends: Vec<End> = Vec::new();
+    let mut left = NONE;
     while (path.alive || path.shadow) && rays < MOST_RAYS_OF_A_PATH {
         rays += 1;
         let hit = traverse(tables, &path);
         path_answer_seen(tables, &mut path, &hit, |path, vertex| {
-            shares += usize::from(path.depth < 2 && can_share(path, vertex));
+            if path.depth < 2 && can_share(path, vertex) {
+                ends.push(end_of(path, vertex));
+                left = if path.depth == 0 { path.left } else { left };
+            }
             vertices.push(Vertex {
                 point: vertex.point,
                 in_medium: vertex.in_medium,
@@ -208,7 +218,16 @@ fn follow_one(tables: &Tables, blocks: Blocks, block: u32, round: u32) -> Trail 
         vertex.rays = f64::from(rays) - vertex.rays;
     }
     vertices.retain(|vertex| vertex.brought.is_finite() && vertex.point.is_finite());
-    Trail { block: block as usize, radiance, direct, shares: shares == 2, rays: f64::from(rays), vertices }
+    let weight = match ends[..] {
+        [first, second] if tables.features.voxels => {
+            let Path { pixel, sample_index, .. } = path;
+            let record = Record { first, second, left, weight: DVec3::ONE, pixel, sample_index, ..Record::default() };
+            passage_weight(tables, &record)
+        }
+        _ => 1.0,
+    };
+    let shares = ends.len() == 2;
+    Trail { block: block as usize, radiance, direct, shares, weight, rays: f64::from(rays), vertices }
 }
 
 /// What the trails say.
@@ -231,6 +250,8 @@ struct View {
     direct: f64,
     shared: f64,
     lonely: f64,
+    /// By how much the weights of shared flights multiply the variance of what lies behind them.
+    noise: f64,
     /// Of a path.
     rays: f64,
 }
@@ -267,9 +288,11 @@ impl View {
             if trail.shares == shares { trail.radiance - trail.direct } else { DVec3::ZERO }
         };
         let (shared, lonely) = (variance(&|trail| behind(trail, true)), variance(&|trail| behind(trail, false)));
+        // Those of the flight that found the second vertex, and of the connection to it.
+        let noise = variance(&|trail| trail.weight * behind(trail, true)) / shared.max(f64::MIN_POSITIVE);
         let rays = trails.iter().map(|trail| trail.rays).sum::<f64>() / trails.len() as f64;
         let known = floor > 0.0 && all > 0.0 && all.is_finite();
-        known.then_some(View { focus, variance: all, direct, shared, lonely, rays })
+        known.then_some(View { focus, variance: all, direct, shared, lonely, noise, rays })
     }
 
     /// Time of the connections of a pixel over that of a path.
@@ -279,7 +302,8 @@ impl View {
 
     /// Variance with groups of so many pixels, as far as a render has it.
     fn variance_with(&self, sharers: u32) -> f64 {
-        self.direct / DIRECT_STRATIFIED + self.lonely + self.shared / alike(sharers)
+        let noise = if sharers == 0 { 1.0 } else { self.noise };
+        self.direct / DIRECT_STRATIFIED + self.lonely + self.shared * noise / alike(sharers)
     }
 
     /// Pixels of the groups that bring the least variance times time; 0 if that is hardly less than without.

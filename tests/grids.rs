@@ -161,7 +161,8 @@ fn fields_and_walks_agree_with_the_reference() {
             }
             let mut walk = reference::start_grid_walk(&grid, origin, direction, begin, end);
             let mut tau = tyndall::reference::math::minus_log_1m(u);
-            let found = reference::walk_to_collision(&packed.values, &grid, false, &mut walk, &mut tau);
+            let found =
+                reference::walk_to_collision(&packed.values, &grid, reference::Rate::Delta, &mut walk, &mut tau);
             count += 1;
             if found != (answer[2][2] >= 0.0 || f64::from(answer[2][2]) > begin - 1e-3 && answer[2][2] != -1.0) {
                 flips += 1;
@@ -279,7 +280,7 @@ fn transmittance_has_the_right_mean_and_variance() {
         let by_reference: Vec<f64> = (0..2000)
             .map(|seed| {
                 let key = pcg4d([seed, 1, 2, 3]);
-                reference::grid_transmittance(&packed.values, &grid, query.sigma_t, &span, key, &mut 0).0.x
+                reference::grid_transmittance(&packed.values, &grid, query.sigma_t, false, &span, key, &mut 0).0.x
             })
             .collect();
         let answers = ask(&packed.grids, &packed.values, &queries[..2000]);

@@ -118,13 +118,19 @@ vec3 walk_point(Grid grid, GridWalk walk) {
     return (walk.origin + walk.direction * walk.t) / vec3(grid.cells_x, grid.cells_y, grid.cells_z);
 }
 
+// Which rate a walk's tentative collisions have: that of delta tracking; what is left of the largest extinction coefficient of each cell
+// without the smallest, which takes away what is known; or the mean.
+const uint WALK_DELTA = 0u;
+const uint WALK_RESIDUAL = 1u;
+const uint WALK_MEAN = 2u;
+
 // Goes on to the next tentative collision, at an optical depth tau of them, which loses what the way takes; false if the walk ends
-// before. Where `residual`, the smallest extinction coefficient of each cell is left out of the rate: what it takes away is known.
-bool walk_to_collision(Grid grid, bool residual, inout GridWalk walk, inout float tau) {
+// before.
+bool walk_to_collision(Grid grid, uint kind, inout GridWalk walk, inout float tau) {
     [[dont_unroll]] while (walk.t < walk.end) {
         uint first = grid.first_cell + 4u * uint((walk.cell.z * int(grid.cells_y) + walk.cell.y) * int(grid.cells_x) + walk.cell.x);
         float most = VALUE(first), least = VALUE(first + 1u), mean = VALUE(first + 2u);
-        float rate = residual ? most - least : VALUE(first + 3u);
+        float rate = kind == WALK_DELTA ? VALUE(first + 3u) : (kind == WALK_RESIDUAL ? most - least : mean);
         vec3 side = vec3(walk.cell) + mix(vec3(0.0), vec3(1.0), greaterThan(walk.direction, vec3(0.0)));
         vec3 leaves = (side - walk.origin) / walk.direction;
         float nearest = min(leaves.x, min(leaves.y, leaves.z));
@@ -156,6 +162,13 @@ bool walk_to_collision(Grid grid, bool residual, inout GridWalk walk, inout floa
     return false;
 }
 
+// The mean of the cell in which a point of the unit cube lies.
+float grid_mean(Grid grid, vec3 local) {
+    vec3 cells = vec3(grid.cells_x, grid.cells_y, grid.cells_z);
+    uvec3 cell = uvec3(clamp(floor(local * cells), vec3(0.0), cells - 1.0));
+    return VALUE(grid.first_cell + 4u * ((cell.z * grid.cells_y + cell.y) * grid.cells_x + cell.x) + 2u);
+}
+
 // Four numbers of a stream.
 vec4 stream_numbers(uvec4 key, uint index) {
     return to_unit(pcg4d(uvec4(key.x + index, key.yzw)));
@@ -167,13 +180,14 @@ const float FAINT_DEPTH = 7.0;
 
 // An unbiased estimate of the transmittance between two distances, by residual ratio tracking (Novak et al. 2014): what each cell takes
 // away at least is exact, the rest is a product over tentative collisions. Adds to `mean` the optical depth of the cells' means, which
-// is a function of the ray alone, and to `index` the numbers that it took from the stream.
-vec3 grid_transmittance(Grid grid, vec3 sigma_t, vec3 origin, vec3 direction, float t_begin, float t_end, uvec4 key, inout uint index, inout float mean) {
+// is a function of the ray alone, and to `index` the numbers that it took from the stream. Where nothing passes, `mean` is only that of a
+// part of the way, unless the `whole` is asked for.
+vec3 grid_transmittance(Grid grid, vec3 sigma_t, bool whole, vec3 origin, vec3 direction, float t_begin, float t_end, uvec4 key, inout uint index, inout float mean) {
     GridWalk walk = start_grid_walk(grid, origin, direction, t_begin, t_end);
     vec3 passes = vec3(1.0);
     float tau = minus_log_1m(stream_numbers(key, index).x);
     index += 1u;
-    [[dont_unroll]] while (walk_to_collision(grid, true, walk, tau)) {
+    [[dont_unroll]] while (walk_to_collision(grid, WALK_RESIDUAL, walk, tau)) {
         vec4 u = stream_numbers(key, index);
         index += 1u;
         vec3 sigma = sigma_t * grid_value(grid, walk_point(grid, walk));
@@ -182,7 +196,10 @@ vec3 grid_transmittance(Grid grid, vec3 sigma_t, vec3 origin, vec3 direction, fl
         if (max_component(passes) < FAINT_TRANSMITTANCE || walk.least > FAINT_DEPTH) {
             passes = u.y < 0.5 ? vec3(0.0) : 2.0 * passes;
             if (max_component(passes) == 0.0) {
-                break;
+                if (!whole) {
+                    break;
+                }
+                tau = INFINITE_DISTANCE;
             }
         }
     }
@@ -208,6 +225,11 @@ float height_length(Grid grid, vec3 origin, vec3 direction, float t_begin, float
     below = slope > 0.0 ? below : way - above;
     float low = slope > 0.0 ? max(begin, 0.0) : max(begin - steep * above, 0.0);
     return below + length_above(low, steep, above);
+}
+
+// The density at a point.
+float height_density(Grid grid, vec3 point) {
+    return exp_minus(max(dot(grid.row_x, point) + grid.shift_x, 0.0));
 }
 
 // log(1 + x) for x >= 0.

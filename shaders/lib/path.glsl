@@ -17,6 +17,7 @@
 #include "lib/path_lights.glsl"
 #include "lib/path_rays.glsl"
 #include "lib/path_flight.glsl"
+#include "lib/path_shadow.glsl"
 #include "lib/path_share.glsl"
 #include "lib/camera.glsl"
 #include "lib/filter.glsl"
@@ -182,18 +183,6 @@ void next_segment(inout Path path) {
     begin_segment(path, u.zw);
 }
 
-// Goes straight on through a surface, at path.anchor.
-void cross_surface(inout Path path, Surface surface, Hit hit) {
-    uint inside = surface.media & 0xffffu, outside = surface.media >> 16u;
-    bool again = path.last != NONE && hit.t - path.t_min < near_distance(path, hit.t);
-    enter_medium(path, hit.along_normal ? inside : outside, hit.along_normal ? outside : inside, again);
-    path.t_min = hit.t;
-    path.last = hit.primitive;
-    path.last_along_normal = hit.along_normal;
-    path.tau_left = max(path.tau_left, 0.0);
-    path.t_max = flight_end(path);
-}
-
 // Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
 bool passes_mask(inout Path path, Surface surface, Primitive primitive, Hit hit) {
     float opacity = opacity_at(surface, primitive, hit.primitive, path.origin + path.direction * hit.t, hit.barycentric, path.direction);
@@ -278,7 +267,11 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         medium = MEDIUM(valid_medium(path.medium));
         bool voxels = HAS_VOXELS && (medium.grids & MEDIUM_VOXELS) != 0u;
         if (voxels) {
-            end = end_voxel_flight(path, medium, t, emitters_seen(path));
+            if (HAS_SHARING && path.sharing == 1u && path.depth == 1u) {
+                end = end_mean_flight(path, medium, t);
+            } else {
+                end = end_voxel_flight(path, medium, t, emitters_seen(path));
+            }
         } else if (HAS_HEIGHTS && (medium.grids & MEDIUM_HEIGHT) != 0u) {
             end = end_height_flight(path, medium, t);
         } else {
@@ -406,39 +399,9 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
     return path.alive;
 }
 
-// Takes a shadow ray to the next boundary, or to its end; whether it has to go on from there.
-bool advance_shadow(inout Path path, inout Hit hit) {
-    bool reaches = hit.primitive == NONE;
-    pass_medium(path, reaches ? path.t_max : hit.t);
-    if (max_component(path.light_passes) == 0.0) {
-        hit.blocked = true;
-        return false;
-    }
-    if (reaches) {
-        hit.medium = path.medium;
-        hit.passed = path.passed;
-        return false;
-    }
-    Primitive primitive = PRIMITIVE(hit.primitive);
-    Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
-    if (HAS_MASK && (primitive.surface & PRIMITIVE_BOUNDARY) == 0u) {
-        vec3 point = path.origin + path.direction * hit.t;
-        path.passed *= 1.0 - opacity_at(surface, primitive, hit.primitive, point, hit.barycentric, path.direction);
-        if (HAS_TINTS && (surface.flags & SURFACE_PANE) != 0u) {
-            vec3 depth = pane_depth(surface, primitive, hit.primitive, point, hit.barycentric);
-            path.tau_rgb += depth;
-            path.tau_mean += depth;
-        }
-    }
-    float t_max = path.t_max;
-    cross_surface(path, surface, hit);
-    path.t_max = t_max;
-    return true;
-}
-
 // Adds what a shadow ray brings, or takes it further.
 void path_light(inout Path path, Hit hit) {
-    if (HAS_GRIDS && !hit.blocked && advance_shadow(path, hit)) {
+    if (HAS_GRIDS && !hit.blocked && advance_shadow(path, hit, false)) {
         return;
     }
     if (!hit.blocked) {

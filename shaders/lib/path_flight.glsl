@@ -124,7 +124,7 @@ FlightEnd end_voxel_flight(inout Path path, Medium medium, float t_end, bool shi
     uvec4 key = set_key(params.seed, path.pixel, FLIGHT_STREAMS + path.segment, path.sample_index);
     GridWalk walk = start_grid_walk(grid, path.origin, path.direction, path.t_min, t_end);
     float tau = path.tau_left;
-    [[dont_unroll]] while (walk_to_collision(grid, false, walk, tau)) {
+    [[dont_unroll]] while (walk_to_collision(grid, WALK_DELTA, walk, tau)) {
         vec4 u = stream_numbers(key, path.collisions);
         path.collisions += 1u;
         vec3 sigma = medium.sigma_t * grid_value(grid, walk_point(grid, walk));
@@ -147,6 +147,40 @@ FlightEnd end_voxel_flight(inout Path path, Medium medium, float t_end, bool shi
     return end;
 }
 
+// The same from the first vertex of a path that pixels share to the second. The density of that must be known, so the flight is one through
+// the means of the cells, and the throughput has an estimate of what truly passes, and scatters, over that. A medium's vertex that is shared
+// does without: there the throughput begins anew.
+FlightEnd end_mean_flight(inout Path path, Medium medium, float t_end) {
+    Grid grid = GRID((medium.grids & 0xffffffu) - 1u);
+    FlightEnd end = FlightEnd(false, t_end - path.t_min, medium.albedo, 0.0);
+    GridWalk walk = start_grid_walk(grid, path.origin, path.direction, path.t_min, t_end);
+    end.scatters = walk_to_collision(grid, WALK_MEAN, walk, path.tau_left);
+    path.tau_mean += walk.mean;
+    if (end.scatters) {
+        end.way = walk.t - path.t_min;
+    }
+    if (!end.scatters || medium.phase != 0u) {
+        uvec4 key = set_key(params.seed, path.pixel, FLIGHT_STREAMS + path.segment, path.sample_index);
+        float mean = 0.0;
+        float t = path.t_min + end.way;
+        vec3 passes = grid_transmittance(grid, medium.sigma_t, true, path.origin, path.direction, path.t_min, t, key, path.collisions, mean);
+        vec3 scattered = end.scatters ? medium.sigma_t * grid_value(grid, walk_point(grid, walk)) / walk.rate : vec3(1.0);
+        path.throughput *= passes * scattered / exp_minus(mean);
+    }
+    return end;
+}
+
+// The extinction coefficient of a gray medium at a point, and that by which flights go that end at second vertices.
+vec2 extinction_at(Medium medium, vec3 point) {
+    Grid grid = GRID((medium.grids & 0xffffffu) - 1u);
+    float sigma = medium.sigma_t.x;
+    if (HAS_VOXELS && (medium.grids & MEDIUM_VOXELS) != 0u) {
+        vec3 local = grid_local(grid, point);
+        return vec2(sigma * grid_value(grid, local).x, grid_mean(grid, local));
+    }
+    return vec2(HAS_HEIGHTS && (medium.grids & MEDIUM_HEIGHT) != 0u ? sigma * height_density(grid, point) : sigma);
+}
+
 // The albedo's factor at the end of a flight.
 vec3 albedo_factor(Medium medium, vec3 point) {
     if ((medium.grids & MEDIUM_ALBEDO_GRID) == 0u) {
@@ -156,14 +190,15 @@ vec3 albedo_factor(Medium medium, vec3 point) {
     return grid_value(grid, grid_local(grid, point));
 }
 
-// A stretch of a shadow ray from t_min to t_end, within one medium.
-void pass_medium(inout Path path, float t_end) {
+// A stretch of a shadow ray from t_min to t_end, within one medium. Where nothing passes, its mean optical depth is known only where the
+// `whole` is asked for.
+void pass_medium(inout Path path, float t_end, bool whole) {
     Medium medium = MEDIUM(valid_medium(path.medium));
     uint first = (medium.grids & 0xffffffu) - 1u;
     if (HAS_VOXELS && (medium.grids & MEDIUM_VOXELS) != 0u) {
         uvec4 key = set_key(params.seed, path.pixel, SHADOW_STREAMS + path.segment, path.sample_index);
         float mean = 0.0;
-        path.light_passes *= grid_transmittance(GRID(first), medium.sigma_t, path.origin, path.direction, path.t_min, t_end, key, path.collisions, mean);
+        path.light_passes *= grid_transmittance(GRID(first), medium.sigma_t, whole, path.origin, path.direction, path.t_min, t_end, key, path.collisions, mean);
         path.tau_mean += mean;
         return;
     }

@@ -15,6 +15,7 @@
 #include "lib/path_vertex.glsl"
 #include "lib/path_rays.glsl"
 #include "lib/path_aim.glsl"
+#include "lib/path_flight.glsl"
 
 // What the vertex of a path is for others.
 const uint END_NONE = 0u;
@@ -30,6 +31,9 @@ const uint PIVOT = 12u; // what the first vertex's direction and flight went by
 const uint NORMALS = 13u; // where shading normals are: the geometric ones of the first and the second vertex
 
 const uvec2 SHARE_SIZE = uvec2(2u, SHARERS == 4u ? 2u : 4u);
+
+// Connections have streams of numbers as if they were the shadow rays of these segments, one for each second vertex.
+const uint CONNECTION_SEGMENTS = 0x10000000u;
 
 // Rays end this many times the offset of rays that leave a surface before it.
 const float END_MARGIN = 4.0;
@@ -68,7 +72,7 @@ uint record_of(uint slot) {
 }
 
 // Whether what a connection brings and its density are not one and the same number.
-const bool HAS_PAIR_VECTORS = HAS_CHROMATIC || HAS_EQUIANGULAR;
+const bool HAS_PAIR_VECTORS = HAS_CHROMATIC || HAS_EQUIANGULAR || HAS_GRIDS;
 
 // Where the densities of a group's connections begin. `number` is that of the group, times samples.
 uint pairs_of(uint number) {
@@ -147,7 +151,10 @@ void share_vertex(inout Path path, inout Vertex vertex) {
         // The densities are those of flights that end in media that only absorb as well. A path that does not brings so much less instead.
         path.throughput = vec3(HAS_ABSORBING || HAS_TINTS ? path.absorbed : 1.0);
         path.before /= max(path.throughput, vec3(1e-30));
-        vertex.albedo = vertex.in_medium ? MEDIUM(valid_medium(path.medium)).albedo : vertex.albedo;
+        if (vertex.in_medium) {
+            Medium medium = MEDIUM(valid_medium(path.medium));
+            vertex.albedo = HAS_GRIDS ? medium.albedo * albedo_factor(medium, vertex.point) : medium.albedo;
+        }
         path.sharing = 2u;
     }
 }
@@ -221,6 +228,13 @@ bool begin_connection(inout Path path, End first, End second, Pivot pivot, out f
     path.medium = first.medium;
     path.light_medium = first.medium;
     path.shadow = true;
+    if (HAS_GRIDS) {
+        path.tau_rgb = vec3(0.0);
+        path.tau_mean = vec3(0.0);
+        path.light_passes = vec3(1.0);
+        path.passed = 1.0;
+        path.collisions = 0u;
+    }
     if (first.kind == END_SURFACE) {
         density = max(dot(first.axis, path.direction), 0.0) * INV_PI;
         density = HAS_SHADING_NORMALS && dot(first.normal, path.direction) <= 0.0 ? 0.0 : density;
@@ -250,6 +264,15 @@ float connection_factor(Path path, Hit hit, End first, End second, Pivot pivot, 
 vec4 end_connection(Path path, Hit hit, End first, End second, Pivot pivot, vec3 weight, float density, float aimed) {
     if (hit.blocked) {
         return vec4(0.0);
+    }
+    if (HAS_GRIDS) {
+        // Of voxels there is an estimate of what passes, and a density that is known.
+        vec2 extinction = vec2(1.0);
+        if (second.kind == END_MEDIUM) {
+            extinction = extinction_at(MEDIUM(second.medium), second.point);
+        }
+        vec3 passes = density * extinction.x * path.light_passes * exp_minus(path.tau_rgb);
+        return vec4(passes, density * extinction.y * exp_minus(path.tau_mean.x));
     }
     vec3 passes = vec3(density);
     if (HAS_MEDIA) {

@@ -26,12 +26,12 @@ void main() {
             outputs[4u * i] = vec4(grid_value(grid, grid_local(grid, from.xyz)), 0.0);
             uint index = 0u;
             float mean = 0.0;
-            vec3 passes = grid_transmittance(grid, medium.xyz, from.xyz, to.xyz, from.w, to.w, key, index, mean);
+            vec3 passes = grid_transmittance(grid, medium.xyz, false, from.xyz, to.xyz, from.w, to.w, key, index, mean);
             outputs[4u * i + 1u] = vec4(passes, mean);
             vec2 clipped = clip_to_grid(grid, from.xyz, to.xyz, from.w, to.w);
             GridWalk walk = start_grid_walk(grid, from.xyz, to.xyz, from.w, to.w);
             float tau = minus_log_1m(more.x);
-            bool found = walk_to_collision(grid, false, walk, tau);
+            bool found = walk_to_collision(grid, WALK_DELTA, walk, tau);
             outputs[4u * i + 2u] = vec4(clipped, found ? walk.t : -1.0, found ? walk.rate : 0.0);
         }
         float dense = voxels ? 0.0 : height_length(grid, from.xyz, to.xyz, from.w, to.w);

@@ -41,6 +41,7 @@ sources! {
     "lib/path_flight.glsl",
     "lib/path_lights.glsl",
     "lib/path_rays.glsl",
+    "lib/path_shadow.glsl",
     "lib/path_share.glsl",
     "lib/path_state.glsl",
     "lib/path_surface.glsl",

@@ -150,14 +150,29 @@ pub fn walk_point(grid: &Grid, walk: &GridWalk) -> DVec3 {
     (walk.origin + walk.direction * walk.t) / grid.cell_counts()
 }
 
+/// Which rate a walk's tentative collisions have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rate {
+    /// That of delta tracking.
+    Delta,
+    /// What is left of the largest extinction coefficient without the smallest.
+    Residual,
+    /// The mean.
+    Mean,
+}
+
 /// Goes on to the next tentative collision, at an optical depth `tau` of them; false if the walk ends before.
-pub fn walk_to_collision(values: &[f32], grid: &Grid, residual: bool, walk: &mut GridWalk, tau: &mut f64) -> bool {
+pub fn walk_to_collision(values: &[f32], grid: &Grid, kind: Rate, walk: &mut GridWalk, tau: &mut f64) -> bool {
     let counts = IVec3::from_array(grid.cells.map(|count| count as i32));
     while walk.t < walk.end {
         let first = (walk.cell.z * counts.y + walk.cell.y) * counts.x + walk.cell.x;
         let first = (grid.first_cell + 4 * first as u32) as usize;
         let [most, least, mean, rate] = [0, 1, 2, 3].map(|k| f64::from(values[first + k]));
-        let rate = if residual { most - least } else { rate };
+        let rate = match kind {
+            Rate::Delta => rate,
+            Rate::Residual => most - least,
+            Rate::Mean => mean,
+        };
         let forward = walk.direction.cmpgt(DVec3::ZERO);
         let side = walk.cell.as_dvec3() + DVec3::select(forward, DVec3::ONE, DVec3::ZERO);
         let leaves = (side - walk.origin) / walk.direction;
@@ -185,6 +200,13 @@ pub fn walk_to_collision(values: &[f32], grid: &Grid, residual: bool, walk: &mut
     false
 }
 
+/// The mean of the cell in which a point of the unit cube lies.
+pub fn grid_mean(values: &[f32], grid: &Grid, local: DVec3) -> f64 {
+    let cell = (local * grid.cell_counts()).floor().clamp(DVec3::ZERO, grid.cell_counts() - 1.0).as_uvec3();
+    let index = (cell.z * grid.cells[1] + cell.y) * grid.cells[0] + cell.x;
+    f64::from(values[(grid.first_cell + 4 * index) as usize + 2])
+}
+
 /// Four numbers of a stream.
 pub fn stream_numbers(key: [u32; 4], index: u32) -> DVec4 {
     to_unit(pcg4d([key[0].wrapping_add(index), key[1], key[2], key[3]]))
@@ -210,6 +232,7 @@ pub fn grid_transmittance(
     values: &[f32],
     grid: &Grid,
     sigma_t: DVec3,
+    whole: bool,
     span: &Span,
     key: [u32; 4],
     index: &mut u32,
@@ -218,7 +241,7 @@ pub fn grid_transmittance(
     let mut passes = DVec3::ONE;
     let mut tau = minus_log_1m(stream_numbers(key, *index).x);
     *index += 1;
-    while walk_to_collision(values, grid, true, &mut walk, &mut tau) {
+    while walk_to_collision(values, grid, Rate::Residual, &mut walk, &mut tau) {
         let u = stream_numbers(key, *index);
         *index += 1;
         let sigma = sigma_t * grid_value(values, grid, walk_point(grid, &walk));
@@ -227,7 +250,10 @@ pub fn grid_transmittance(
         if max_component(passes) < FAINT_TRANSMITTANCE || walk.least > FAINT_DEPTH {
             passes = if u.y < 0.5 { DVec3::ZERO } else { 2.0 * passes };
             if max_component(passes) == 0.0 {
-                break;
+                if !whole {
+                    break;
+                }
+                tau = INFINITE_DISTANCE;
             }
         }
     }
@@ -244,6 +270,11 @@ pub fn length_above(low: f64, slope: f64, way: f64) -> f64 {
 fn height_at(grid: &Grid, origin: DVec3, direction: DVec3, t: f64) -> (f64, f64) {
     let slope = grid.rows[0].dot(direction);
     (grid.rows[0].dot(origin) + grid.shift.x + slope * t, slope)
+}
+
+/// The density at a point.
+pub fn height_density(grid: &Grid, point: DVec3) -> f64 {
+    exp_minus(height_at(grid, point, DVec3::ZERO, 0.0).0.max(0.0))
 }
 
 /// Density times length between two distances; the density is exp(−h) above the height 0, and 1 below.

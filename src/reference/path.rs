@@ -12,8 +12,8 @@ use super::open_flight::{mean_passage, open_factor};
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
 use super::path_aim::{aimed_pdf, find_aim, find_pivot, is_common, sample_next, weighing_pdf};
 use super::path_flight::{
-    albedo_factor, end_flight, end_height_flight, end_voxel_flight, enter_medium, flight_point, flight_side, free_way,
-    near_distance, pass_medium, rare_collision_weight, rare_passage_weight,
+    albedo_factor, end_flight, end_height_flight, end_mean_flight, end_voxel_flight, enter_medium, flight_point,
+    flight_side, free_way, near_distance, pass_medium, rare_collision_weight, rare_passage_weight,
 };
 use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, sample_light};
 pub use super::path_rays::{begin_hit, test_primitive};
@@ -287,7 +287,9 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
 
     let medium = *medium_at(tables, path.medium);
     let voxels = medium.grids & MEDIUM_VOXELS != 0;
-    let end = if voxels {
+    let end = if voxels && path.sharing == 1 && path.depth == 1 {
+        end_mean_flight(tables, path, &medium, t)
+    } else if voxels {
         let shines = emitters_seen(tables, path);
         end_voxel_flight(tables, path, &medium, t, shines)
     } else if medium.grids & MEDIUM_HEIGHT != 0 {
@@ -400,10 +402,10 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
 }
 
 /// Takes a shadow ray to the next boundary, or to its end; whether it has to go on from there.
-fn advance_shadow(tables: &Tables, path: &mut Path, hit: &mut Hit) -> bool {
+pub fn advance_shadow(tables: &Tables, path: &mut Path, hit: &mut Hit, whole: bool) -> bool {
     let reaches = hit.primitive == NONE;
-    pass_medium(tables, path, if reaches { path.t_max } else { hit.t });
-    if max_component(path.light_passes) == 0.0 {
+    pass_medium(tables, path, if reaches { path.t_max } else { hit.t }, whole);
+    if !whole && max_component(path.light_passes) == 0.0 {
         hit.blocked = true;
         return false;
     }
@@ -433,7 +435,7 @@ fn advance_shadow(tables: &Tables, path: &mut Path, hit: &mut Hit) -> bool {
 /// Adds what a shadow ray brings, or takes it further.
 fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
     let mut hit = *hit;
-    if tables.features.grids && !hit.blocked && advance_shadow(tables, path, &mut hit) {
+    if tables.features.grids && !hit.blocked && advance_shadow(tables, path, &mut hit, false) {
         return;
     }
     if !hit.blocked {

@@ -3,8 +3,8 @@
 use super::bindings::{Medium, Primitive, Tables};
 use super::equiangular::{equiangular_pdf, sample_equiangular, stretch_seen_from};
 use super::grid::{
-    Span, grid_local, grid_transmittance, grid_value, height_flight, height_length, start_grid_walk, stream_numbers,
-    walk_point, walk_to_collision,
+    Rate, Span, grid_local, grid_mean, grid_transmittance, grid_value, height_density, height_flight, height_length,
+    start_grid_walk, stream_numbers, walk_point, walk_to_collision,
 };
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
 use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight, survival_weight};
@@ -125,7 +125,7 @@ pub fn end_voxel_flight(tables: &Tables, path: &mut Path, medium: &Medium, t_end
     let key = set_key(tables.params.seed, path.pixel, FLIGHT_STREAMS + path.segment, path.sample_index);
     let mut walk = start_grid_walk(grid, path.origin, path.direction, path.t_min, t_end);
     let mut tau = path.tau_left;
-    while walk_to_collision(values, grid, false, &mut walk, &mut tau) {
+    while walk_to_collision(values, grid, Rate::Delta, &mut walk, &mut tau) {
         let u = stream_numbers(key, path.collisions);
         path.collisions += 1;
         let sigma = medium.sigma_t * grid_value(values, grid, walk_point(grid, &walk));
@@ -147,6 +147,41 @@ pub fn end_voxel_flight(tables: &Tables, path: &mut Path, medium: &Medium, t_end
     end
 }
 
+/// The same from the first vertex of a path that pixels share to the second, through the means of the cells.
+pub fn end_mean_flight(tables: &Tables, path: &mut Path, medium: &Medium, t_end: f64) -> FlightEnd {
+    let grid = &tables.grids[(medium.grids & 0xff_ffff) as usize - 1];
+    let values = &tables.values;
+    let mut end = FlightEnd { scatters: false, way: t_end - path.t_min, weight: medium.albedo, dense: 0.0 };
+    let mut walk = start_grid_walk(grid, path.origin, path.direction, path.t_min, t_end);
+    end.scatters = walk_to_collision(values, grid, Rate::Mean, &mut walk, &mut path.tau_left);
+    path.tau_mean += walk.mean;
+    if end.scatters {
+        end.way = walk.t - path.t_min;
+    }
+    if !end.scatters || medium.phase != 0 {
+        let key = set_key(tables.params.seed, path.pixel, FLIGHT_STREAMS + path.segment, path.sample_index);
+        let (t_begin, t_end) = (path.t_min, path.t_min + end.way);
+        let span = Span { origin: path.origin, direction: path.direction, t_begin, t_end };
+        let (passes, mean) = grid_transmittance(values, grid, medium.sigma_t, true, &span, key, &mut path.collisions);
+        path.throughput *= passes * mean.exp();
+        if end.scatters {
+            path.throughput *= medium.sigma_t * grid_value(values, grid, walk_point(grid, &walk)) / walk.rate;
+        }
+    }
+    end
+}
+
+/// The extinction coefficient of a gray medium at a point, and that by which flights go that end at second vertices.
+pub fn extinction_at(tables: &Tables, medium: &Medium, point: DVec3) -> [f64; 2] {
+    let grid = || &tables.grids[(medium.grids & 0xff_ffff) as usize - 1];
+    let sigma = medium.sigma_t.x;
+    if medium.grids & MEDIUM_VOXELS != 0 {
+        let local = grid_local(grid(), point);
+        return [sigma * grid_value(&tables.values, grid(), local).x, grid_mean(&tables.values, grid(), local)];
+    }
+    [if medium.grids & MEDIUM_HEIGHT != 0 { sigma * height_density(grid(), point) } else { sigma }; 2]
+}
+
 /// The albedo's factor at the end of a flight.
 pub fn albedo_factor(tables: &Tables, medium: &Medium, point: DVec3) -> DVec3 {
     if medium.grids & MEDIUM_ALBEDO_GRID == 0 {
@@ -157,14 +192,14 @@ pub fn albedo_factor(tables: &Tables, medium: &Medium, point: DVec3) -> DVec3 {
 }
 
 /// A stretch of a shadow ray from `t_min` to `t_end`, within one medium.
-pub fn pass_medium(tables: &Tables, path: &mut Path, t_end: f64) {
+pub fn pass_medium(tables: &Tables, path: &mut Path, t_end: f64, whole: bool) {
     let medium = medium_at(tables, path.medium);
     let span = Span { origin: path.origin, direction: path.direction, t_begin: path.t_min, t_end };
     let grid = || &tables.grids[(medium.grids & 0xff_ffff) as usize - 1];
     if medium.grids & MEDIUM_VOXELS != 0 {
         let key = set_key(tables.params.seed, path.pixel, SHADOW_STREAMS + path.segment, path.sample_index);
         let index = &mut path.collisions;
-        let (passes, mean) = grid_transmittance(&tables.values, grid(), medium.sigma_t, &span, key, index);
+        let (passes, mean) = grid_transmittance(&tables.values, grid(), medium.sigma_t, whole, &span, key, index);
         path.light_passes *= passes;
         path.tau_mean += mean;
         return;

@@ -3,10 +3,12 @@
 
 use super::bindings::Tables;
 use super::bsdf::BsdfSample;
-use super::math::{exp_minus_rgb, max_component};
+use super::math::{exp_minus, exp_minus_rgb, max_component};
 use super::medium::channel_weights;
 use super::open_flight::{mean_passage, open_factor, open_flight};
+use super::path::advance_shadow;
 use super::path_aim::{Aim, Pivot, aim_at, aimed_pdf, is_common};
+use super::path_flight::{albedo_factor, extinction_at};
 use super::path_state::{Hit, NONE, Path, medium_at};
 use super::path_vertex::Vertex;
 use super::phase::eval_henyey_greenstein;
@@ -16,6 +18,9 @@ use std::f64::consts::PI;
 
 /// Rays end this many times the offset of rays that leave a surface before it.
 const END_MARGIN: f64 = 4.0;
+
+/// Connections have streams of numbers as if they were the shadow rays of these segments, one for each second vertex.
+const CONNECTION_SEGMENTS: u32 = 0x1000_0000;
 
 /// What a vertex is for others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,6 +58,10 @@ pub struct Record {
     pub first: End,
     /// The triangle on which it lies, which its rays cannot meet again.
     pub left: u32,
+    /// Of the film, and of that the sample.
+    pub pixel: u32,
+    /// Of the pixel.
+    pub sample_index: u32,
     /// What its direction and its flight went by.
     pub pivot: Pivot,
     /// What the radiance that it scatters is multiplied with.
@@ -86,7 +95,8 @@ pub fn can_share(path: &Path, vertex: &Vertex) -> bool {
     surface.flags >> SURFACE_KIND_SHIFT == BSDF_DIFFUSE && surface.relief_texture == 0 && path.medium != NONE
 }
 
-fn end_of(path: &Path, vertex: &Vertex) -> End {
+/// A vertex as others see it.
+pub fn end_of(path: &Path, vertex: &Vertex) -> End {
     let kind = if vertex.in_medium { Kind::Medium } else { Kind::Surface };
     let Vertex { point, axis, normal, .. } = *vertex;
     End { point, kind, axis, normal, medium: path.medium, offset: path.offset }
@@ -99,6 +109,8 @@ pub fn share_vertex(tables: &Tables, path: &mut Path, vertex: &mut Vertex) {
         if max_component(weight) > 0.0 {
             path.record.first = end_of(path, vertex);
             path.record.left = path.left;
+            path.record.pixel = path.pixel;
+            path.record.sample_index = path.sample_index;
             path.record.weight = weight;
             path.record.unaimed = 1.0;
             path.sharing = 1;
@@ -112,7 +124,8 @@ pub fn share_vertex(tables: &Tables, path: &mut Path, vertex: &mut Vertex) {
         path.throughput = DVec3::splat(path.absorbed);
         path.before /= path.absorbed.max(1e-30);
         if vertex.in_medium {
-            vertex.albedo = medium_at(tables, path.medium).albedo;
+            let medium = medium_at(tables, path.medium);
+            vertex.albedo = medium.albedo * albedo_factor(tables, medium, vertex.point);
         }
         path.sharing = 2;
     }
@@ -193,6 +206,10 @@ fn begin_connection(tables: &Tables, record: &Record, second: &End, pivot: &Pivo
         light_medium: first.medium,
         left: record.left,
         shadow: true,
+        light_passes: DVec3::ONE,
+        passed: 1.0,
+        pixel: record.pixel,
+        sample_index: record.sample_index,
         ..Path::default()
     };
     (far > 0.0 && density > 0.0).then_some((path, density, aimed))
@@ -221,6 +238,15 @@ fn end_connection(
     if hit.blocked {
         return (DVec3::ZERO, 0.0);
     }
+    if tables.features.grids {
+        // Of voxels there is an estimate of what passes, and a density that is known.
+        let [truly, known] = match to.second.kind {
+            Kind::Medium => extinction_at(tables, medium_at(tables, to.second.medium), to.second.point),
+            _ => [1.0; 2],
+        };
+        let passes = density * truly * path.light_passes * exp_minus_rgb(path.tau_rgb);
+        return (passes, density * known * exp_minus(path.tau_mean.x));
+    }
     let mut passes = density * exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
     if to.second.kind == Kind::Medium {
         passes *= medium_at(tables, to.second.medium).sigma_t;
@@ -230,14 +256,25 @@ fn end_connection(
 }
 
 /// What the second vertex of `to` brings to the first of `from`, and its density by that.
-fn connect(tables: &Tables, from: &Record, to: &Record) -> (DVec3, f64) {
+fn connect(tables: &Tables, from: &Record, to: &Record, number: u32) -> (DVec3, f64) {
     if from.first.kind == Kind::None || to.second.kind == Kind::None {
         return (DVec3::ZERO, 0.0);
     }
-    let Some((path, density, aimed)) = begin_connection(tables, from, &to.second, &to.pivot) else {
+    let Some((mut path, density, aimed)) = begin_connection(tables, from, &to.second, &to.pivot) else {
         return (DVec3::ZERO, 0.0);
     };
-    end_connection(tables, &path, &super::traverse(tables, &path), to, from, density, aimed)
+    path.segment = CONNECTION_SEGMENTS + number;
+    let mut hit = super::traverse(tables, &path);
+    while tables.features.grids && !hit.blocked && advance_shadow(tables, &mut path, &mut hit, true) {
+        hit = super::traverse(tables, &path);
+    }
+    end_connection(tables, &path, &hit, to, from, density, aimed)
+}
+
+/// What truly passes between the two vertices of a path through voxels, and scatters there, over the density of flights that end there.
+pub fn passage_weight(tables: &Tables, record: &Record) -> f64 {
+    let (passes, density) = connect(tables, record, record, 0);
+    if density > 0.0 { passes.x / density } else { 1.0 }
 }
 
 /// The phase function of a second vertex for light that arrives along `axis`; 1 on a surface, which scatters alike to all sides.
@@ -251,8 +288,8 @@ fn phase(tables: &Tables, second: &End, axis: DVec3, direction: DVec3) -> f64 {
 /// What the second vertices of a group bring to each of its pixels.
 pub fn share(tables: &Tables, records: &[Record]) -> Vec<DVec3> {
     let mut sums = vec![DVec3::ZERO; records.len()];
-    for to in records {
-        let densities: Vec<(DVec3, f64)> = records.iter().map(|from| connect(tables, from, to)).collect();
+    for (number, to) in (0..).zip(records) {
+        let densities: Vec<(DVec3, f64)> = records.iter().map(|from| connect(tables, from, to, number)).collect();
         let of_place: f64 = densities.iter().map(|(_, density)| density).sum();
         if of_place == 0.0 {
             continue;
