@@ -29,8 +29,7 @@ use rayon::prelude::*;
 
 /// Paths of each block, where only sharing is to be decided.
 const FEW_PATHS_PER_BLOCK: u32 = 4;
-/// Where surfaces have lobes, the light of mirrors and glass on others, which cannot be shared, is rare and bright, and so are the weights of
-/// flights through voxels: a few paths do not see them.
+/// Where surfaces have lobes, the light of mirrors and glass on others, which cannot be shared, is rare and bright: a few paths do not see it.
 const MANY_PATHS_PER_BLOCK: u32 = 64;
 /// The part of a render's variance before the second vertex is stratified so much better than that of the pilot.
 const DIRECT_STRATIFIED: f64 = 4.0;
@@ -134,10 +133,13 @@ pub fn run(packed: &mut Packed, sharing: bool) {
 }
 
 fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
-    let rounds = match sharing && (packed.features.lobes() || packed.features.voxels) {
-        true => MANY_PATHS_PER_BLOCK,
-        false if roulette => PATHS_PER_BLOCK,
-        false => FEW_PATHS_PER_BLOCK,
+    let features = &packed.features;
+    let rounds = if sharing && features.lobes() {
+        MANY_PATHS_PER_BLOCK
+    } else if roulette || features.voxels {
+        PATHS_PER_BLOCK
+    } else {
+        FEW_PATHS_PER_BLOCK
     };
     let mut tables = Tables::new(packed);
     tables.params.seed = SEED;
