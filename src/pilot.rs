@@ -26,10 +26,12 @@ use crate::reference::path_state::NONE;
 use crate::reference::traverse;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Paths of each block, where only sharing is to be decided.
 const FEW_PATHS_PER_BLOCK: u32 = 4;
-/// Where surfaces have lobes, the light of mirrors and glass on others, which cannot be shared, is rare and bright: a few paths do not see it.
+/// The light of mirrors and glass on other surfaces, which cannot be shared, is rare and bright: a few paths do not see it. So where surfaces
+/// have lobes and sharing seems to pay, that is asked of so many.
 const MANY_PATHS_PER_BLOCK: u32 = 64;
 /// The part of a render's variance before the second vertex is stratified so much better than that of the pilot.
 const DIRECT_STRATIFIED: f64 = 4.0;
@@ -134,20 +136,18 @@ pub fn run(packed: &mut Packed, sharing: bool) {
 
 fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
     let features = &packed.features;
-    let rounds = if sharing && features.lobes() {
-        MANY_PATHS_PER_BLOCK
-    } else if roulette || features.voxels {
-        PATHS_PER_BLOCK
-    } else {
-        FEW_PATHS_PER_BLOCK
-    };
+    let rounds = if roulette || features.voxels { PATHS_PER_BLOCK } else { FEW_PATHS_PER_BLOCK };
     let mut tables = Tables::new(packed);
     tables.params.seed = SEED;
     let params = &packed.params;
     let side = params.crop_width.max(params.crop_height).div_ceil(MOST_BLOCKS);
     let blocks = Blocks { side, columns: params.crop_width.div_ceil(side), rows: params.crop_height.div_ceil(side) };
-    let trails = follow(&tables, blocks, rounds);
-    let Some(view) = View::of(&trails, blocks) else { return };
+    let mut trails = follow(&tables, blocks, 0..rounds);
+    let Some(mut view) = View::of(&trails, blocks) else { return };
+    if sharing && features.lobes() && view.best_sharers() > 0 {
+        trails.extend(follow(&tables, blocks, rounds..MANY_PATHS_PER_BLOCK));
+        view = View::of(&trails, blocks).unwrap_or(view);
+    }
     packed.features.sharers = if sharing { view.best_sharers() } else { 0 };
     if roulette && let Some(found) = Found::of(&trails, &view, packed.features.sharers) {
         found.add_to(packed, blocks);
@@ -163,10 +163,10 @@ pub fn can_share_paths(packed: &Packed) -> bool {
 }
 
 /// Follows one path for each block, and again until there are enough. The order of the result does not depend on the threads.
-fn follow(tables: &Tables, blocks: Blocks, rounds: u32) -> Vec<Trail> {
+fn follow(tables: &Tables, blocks: Blocks, rounds: Range<u32>) -> Vec<Trail> {
     let mut trails = Vec::new();
     let mut rays = 0;
-    for round in 0..rounds {
+    for round in rounds {
         let of_round: Vec<Trail> = (0..blocks.columns * blocks.rows)
             .into_par_iter()
             .map(|block| follow_one(tables, blocks, block, round))

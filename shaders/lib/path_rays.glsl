@@ -40,7 +40,7 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
         // In order: what lies between boundaries is not known before.
         bool counts = begins && t < path.t_max && primitive.light != path.light + 1u;
         bool passes = HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u;
-#ifdef WITH_MASK // it stands here once for each primitive of the kernel, and drivers take their time for what they then leave out
+#ifdef WITH_MASK // it stands here once for each primitive of the kernel
         if (HAS_MASK && counts && !passes) {
             Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
             passes = (surface.flags & SURFACE_MASK) != 0u && opacity_at(surface, primitive, index, path.origin + path.direction * t, barycentric, path.direction) < 1.0;

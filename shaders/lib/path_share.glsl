@@ -265,7 +265,8 @@ vec4 end_connection(Path path, Hit hit, End first, End second, Pivot pivot, vec3
     if (hit.blocked) {
         return vec4(0.0);
     }
-    if (HAS_GRIDS) {
+#ifdef WITH_GRIDS
+    {
         // Of voxels there is an estimate of what passes, and a density that is known.
         vec2 extinction = vec2(1.0);
         if (second.kind == END_MEDIUM) {
@@ -274,6 +275,7 @@ vec4 end_connection(Path path, Hit hit, End first, End second, Pivot pivot, vec3
         vec3 passes = density * extinction.x * path.light_passes * exp_minus(path.tau_rgb);
         return vec4(passes, density * extinction.y * exp_minus(path.tau_mean.x));
     }
+#endif
     vec3 passes = vec3(density);
     if (HAS_MEDIA) {
         passes *= HAS_CHROMATIC ? exp_minus(max(hit.tau_rgb, vec3(0.0))) : vec3(exp_minus(max(hit.tau, 0.0)));
@@ -281,7 +283,10 @@ vec4 end_connection(Path path, Hit hit, End first, End second, Pivot pivot, vec3
     }
     vec3 weights = HAS_CHROMATIC ? channel_weights(weight) : vec3(0.0);
     float found = HAS_CHROMATIC ? dot(weights, passes) : passes.x;
-    float factor = HAS_EQUIANGULAR ? aimed * connection_factor(path, hit, first, second, pivot, weights, found / density) : 1.0;
+    float factor = 1.0;
+#ifdef WITH_OPEN_FLIGHTS
+    factor = aimed * connection_factor(path, hit, first, second, pivot, weights, found / density);
+#endif
     return vec4(passes, factor * found);
 }
 

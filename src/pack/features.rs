@@ -335,7 +335,15 @@ impl Features {
         ]
         .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
         .concat();
-        let with_mask = if self.masks { "#define WITH_MASK\n" } else { "" };
-        switches + &numbers + with_mask
+        // What is large is left out before drivers see it: they take their time for what they then leave out.
+        let macros = [
+            ("WITH_MASK", self.masks),
+            ("WITH_GRIDS", self.grids),
+            ("WITH_EQUIANGULAR", self.equiangular),
+            ("WITH_OPEN_FLIGHTS", self.equiangular && self.sharers > 0),
+        ]
+        .map(|(name, value)| if value { format!("#define {name}\n") } else { String::new() })
+        .concat();
+        switches + &numbers + &macros
     }
 }

@@ -10,7 +10,7 @@ use super::math::{exp_minus_rgb, max_component, minus_log_1m, orthonormal_frame}
 use super::medium::{channel_weights, sample_channel};
 use super::open_flight::{mean_passage, open_factor};
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
-use super::path_aim::{aimed_pdf, find_aim, find_pivot, is_common, sample_next, weighing_pdf};
+use super::path_aim::{Pivot, aimed_pdf, find_aim, find_pivot, is_common, sample_next, weighing_pdf};
 use super::path_flight::{
     albedo_factor, end_flight, end_height_flight, end_mean_flight, end_voxel_flight, enter_medium, flight_point,
     flight_side, free_way, near_distance, pass_medium, rare_collision_weight, rare_passage_weight,
@@ -140,7 +140,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     }
     let u = vertex_numbers(tables, path, path.segment);
     let lobe = sample_set(tables, path, 2 * path.segment + 2).y;
-    let pivot = find_pivot(tables, path, path.segment + 1);
+    let pivot = if tables.features.equiangular { find_pivot(tables, path, path.segment + 1) } else { Pivot::default() };
     let aim = find_aim(tables, path, vertex, &pivot);
     let (mut next, scattered) = sample_next(tables, vertex, &aim, u.zw(), lobe);
     share_aim(path, vertex, &pivot, &aim, &mut next, scattered);
