@@ -4,7 +4,7 @@
 #include "lib/medium.glsl"
 #include "lib/light.glsl"
 #include "lib/grid.glsl"
-#include "lib/open_flight.glsl"
+#include "lib/path_open.glsl"
 
 // More than minus_log_1m ever gives: no flight is longer.
 const float MAX_FLIGHT_TAU = 16.7;
@@ -73,7 +73,7 @@ struct Path {
     vec3 before;            // the throughput at the second vertex
     vec3 shared_direction;  // in which the path left it
     vec3 lamp_way;          // from the first vertex to the lamp that the flight from there may go by, or 0
-    bool open;              // it goes by lib/open_flight.glsl, and has not left the medium in which it began
+    bool open;              // it goes by lib/path_open.glsl, and has not left the medium in which it began
     float way;              // its length
     float first_way;        // how far it went until it left that medium
     // Roulette by a pilot.

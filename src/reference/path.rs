@@ -8,19 +8,20 @@ use super::film::{group_offset, group_size};
 use super::filter::sample_filter;
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, orthonormal_frame};
 use super::medium::{channel_weights, sample_channel};
-use super::open_flight::{mean_passage, open_factor};
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
 use super::path_aim::{Pivot, aimed_pdf, find_aim, find_pivot, is_common, sample_next, weighing_pdf};
 use super::path_flight::{
-    albedo_factor, end_flight, end_height_flight, end_mean_flight, end_voxel_flight, enter_medium, flight_point,
-    flight_side, free_way, near_distance, pass_medium, rare_collision_weight, rare_passage_weight,
+    albedo_factor, end_flight, end_height_flight, end_mean_flight, end_voxel_flight, flight_point, flight_side,
+    free_way, rare_collision_weight, rare_passage_weight,
 };
 use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, sample_light};
+use super::path_open::{mean_passage, open_factor};
 pub use super::path_rays::{begin_hit, test_primitive};
+use super::path_shadow::{advance_shadow, cross_surface};
 use super::path_share::{share_aim, share_ended, share_light, share_vertex};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
-    INFINITE_DISTANCE, begin_segment, flight_end, medium_at, open_flight_of, sample_camera, sample_lens, sample_set,
+    INFINITE_DISTANCE, begin_segment, medium_at, open_flight_of, sample_camera, sample_lens, sample_set,
     survived_throughput, vertex_numbers,
 };
 use super::path_surface::{
@@ -191,19 +192,6 @@ fn next_segment(tables: &Tables, path: &mut Path) {
     path.medium = path.next_medium;
     path.t_min = 0.0;
     begin_segment(tables, path, u.zw());
-}
-
-/// Goes straight on through a surface, at `path.anchor`.
-fn cross_surface(tables: &Tables, path: &mut Path, surface: &Surface, hit: &Hit) {
-    let (inside, outside) = (surface.media & 0xffff, surface.media >> 16);
-    let (from, to) = if hit.along_normal { (inside, outside) } else { (outside, inside) };
-    let again = path.last != NONE && hit.t - path.t_min < near_distance(path, hit.t);
-    enter_medium(tables, path, from, to, again);
-    path.t_min = hit.t;
-    path.last = hit.primitive;
-    path.last_along_normal = hit.along_normal;
-    path.tau_left = path.tau_left.max(0.0);
-    path.t_max = flight_end(tables, path);
 }
 
 /// Whether light passes a mask. The choice has the probabilities of the two ways, so the throughput stays.
@@ -399,37 +387,6 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     let vertex = Vertex { point, axis, in_medium, g, phase, albedo, surface, incident, tangent, normal, base, fade };
     path.alive = seen && sides_agree(&vertex, incident.z, -path.direction);
     path.alive.then_some(vertex)
-}
-
-/// Takes a shadow ray to the next boundary, or to its end; whether it has to go on from there.
-pub fn advance_shadow(tables: &Tables, path: &mut Path, hit: &mut Hit, whole: bool) -> bool {
-    let reaches = hit.primitive == NONE;
-    pass_medium(tables, path, if reaches { path.t_max } else { hit.t }, whole);
-    if !whole && max_component(path.light_passes) == 0.0 {
-        hit.blocked = true;
-        return false;
-    }
-    if reaches {
-        hit.medium = path.medium;
-        hit.passed = path.passed;
-        return false;
-    }
-    let primitive = tables.primitive(hit.primitive);
-    let surface = tables.surface_of(primitive);
-    if primitive.surface & PRIMITIVE_BOUNDARY == 0 {
-        let point = path.origin + path.direction * hit.t;
-        let place = Place { index: hit.primitive, point, barycentric: hit.barycentric };
-        path.passed *= 1.0 - opacity_at(tables, surface, &place, path.direction);
-        if surface.flags & SURFACE_PANE != 0 {
-            let depth = pane_depth(tables, surface, &place);
-            path.tau_rgb += depth;
-            path.tau_mean += depth;
-        }
-    }
-    let t_max = path.t_max;
-    cross_surface(tables, path, surface, hit);
-    path.t_max = t_max;
-    true
 }
 
 /// Adds what a shadow ray brings, or takes it further.

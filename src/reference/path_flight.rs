@@ -8,8 +8,8 @@ use super::grid::{
 };
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
 use super::medium::{channel_weights, free_flight, medium_code, medium_of_code, scatter_weight, survival_weight};
-use super::open_flight::open_factor;
 use super::path_aim::find_pivot;
+use super::path_open::open_factor;
 use super::path_state::{FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, goes_by_lamps, medium_at, open_flight_of};
 use super::ray::{offset_distance, vertex_clearance};
 use super::sampler::set_key;

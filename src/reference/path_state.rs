@@ -5,7 +5,7 @@ use super::equiangular::sample_equiangular;
 use super::light::{alias_keeps, alias_line};
 use super::math::{exp_minus_rgb, minus_log_1m};
 use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
-use super::open_flight::{OpenFlight, open_flight};
+use super::path_open::{OpenFlight, open_flight};
 use super::path_share::Record;
 use super::sampler::{group_index, group_seed, half_index, half_seed, lens_key, point_index, set_key, shifted_point};
 use crate::pack::layout::{self, MEDIUM_HEIGHT, MEDIUM_VOXELS};
@@ -74,7 +74,7 @@ pub struct Path {
     pub before: DVec3,
     /// From the first vertex to the lamp that the flight from there may go by, or 0.
     pub lamp_way: DVec3,
-    /// It goes by [`super::open_flight`], and has not left the medium in which it began.
+    /// It goes by [`super::path_open`], and has not left the medium in which it began.
     pub open: bool,
     /// Its length.
     pub way: f64,

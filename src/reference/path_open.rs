@@ -1,4 +1,4 @@
-//! Mirror of `shaders/lib/open_flight.glsl`: distances that go by a lamp along a ray whose end is not known.
+//! Mirror of `shaders/lib/path_open.glsl`: distances that go by a lamp along a ray whose end is not known.
 
 use super::bindings::Medium;
 use super::equiangular::{Stretch, equiangular_pdf, equiangular_rest, stretch_seen_from};
