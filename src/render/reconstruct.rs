@@ -22,6 +22,7 @@
 use super::film::{Film, SharedSum, SharedSums};
 use crate::pack::groups::{first_of_shift, group_offset, group_size};
 use glam::DVec3;
+use std::ops::{Add, AddAssign, Mul};
 
 /// A pixel is taken to share at least this part of the mean of all.
 const FLOOR: f64 = 0.05;
@@ -84,7 +85,7 @@ impl Observation<'_> {
     }
 
     /// Sum over the pixels of each group.
-    fn group_sums<T: Copy + Default + std::ops::AddAssign>(&self, of_pixel: impl Fn(usize) -> T) -> Vec<T> {
+    fn group_sums<T: Copy + Default + AddAssign>(&self, of_pixel: impl Fn(usize) -> T) -> Vec<T> {
         let mut sums = vec![T::default(); self.group_count];
         for (pixel, group) in self.group.iter().enumerate() {
             sums[*group as usize] += of_pixel(pixel);
@@ -138,7 +139,10 @@ impl Weights {
         if floor.cmple(DVec3::ZERO).any() {
             return None;
         }
-        let expected: Vec<DVec3> = half.mean.iter().map(|mean| mean.max(DVec3::ZERO) + floor).collect();
+        // Of neighbours together: a rare bright sample would make its pixel seem one whose noise is always large, and the noise of
+        // groups in the other half would be taken from it alone.
+        let positive: Vec<DVec3> = half.mean.iter().map(|mean| mean.max(DVec3::ZERO)).collect();
+        let expected: Vec<DVec3> = blurred(&positive, half.width).into_iter().map(|mean| mean + floor).collect();
         let count = half.observations.len() as f64;
         // Relative variances of one sample: of each pixel's own noise, and of all noise.
         let (mut own, mut all) = (vec![0.0; pixels], 0.0);
@@ -168,20 +172,23 @@ impl Weights {
 }
 
 /// Mean with the neighbours, by [`KERNEL`] in both directions; beyond the edge there are none.
-fn blurred(values: &[f64], width: usize) -> Vec<f64> {
+fn blurred<T>(values: &[T], width: usize) -> Vec<T>
+where
+    T: Copy + Default + Add<Output = T> + Mul<f64, Output = T>,
+{
     let height = values.len() / width;
     let reach = KERNEL.len() / 2;
-    let along = |values: &[f64], step: usize, length: usize, place: &dyn Fn(usize) -> usize| -> Vec<f64> {
+    let along = |values: &[T], step: usize, length: usize, place: &dyn Fn(usize) -> usize| -> Vec<T> {
         (0..values.len())
             .map(|index| {
                 let at = place(index);
-                let (mut sum, mut weights) = (0.0, 0.0);
+                let (mut sum, mut weights) = (T::default(), 0.0);
                 for k in at.saturating_sub(reach)..(at + reach + 1).min(length) {
                     let weight = KERNEL[k + reach - at];
-                    sum += weight * values[index + k * step - at * step];
+                    sum = sum + values[index + k * step - at * step] * weight;
                     weights += weight;
                 }
-                sum / weights
+                sum * (1.0 / weights)
             })
             .collect()
     };
@@ -311,6 +318,11 @@ mod tests {
     /// A film of 64 samples. In each run the pixels of a group have noise in common and noise of their own, each with the given
     /// relative standard deviations and of mean 0.
     fn film(seed: u32, sharers: u32, common: f64, own: f64) -> Film {
+        film_with(seed, sharers, common, own, |_| 0.0)
+    }
+
+    /// The same with something more that depends on a random number of its own for each group or pixel of a run.
+    fn film_with(seed: u32, sharers: u32, common: f64, own: f64, more: impl Fn(f64) -> f64) -> Film {
         let noise = |a: u32, b: u32, c: u32| (to_unit(pcg4d([seed, a, b, c])) - 0.5) * 12f64.sqrt();
         let truth = truth();
         let mut film = Film::new(WIDTH * HEIGHT, 0);
@@ -322,8 +334,9 @@ mod tests {
                     for (number, group) in (0..).zip(groups([WIDTH as u32, HEIGHT as u32], sharers, sample)) {
                         for [x, y] in group {
                             let pixel = y as usize * WIDTH + x as usize;
-                            let together = noise(sample, number, 1).truncate() * common;
-                            let alone = noise(sample, pixel as u32, 2).truncate() * own;
+                            let [group, single] = [noise(sample, number, 1), noise(sample, pixel as u32, 2)];
+                            let together = (group.truncate() + more(group.w)) * common;
+                            let alone = (single.truncate() + more(single.w)) * own;
                             run[pixel] = (truth[pixel] * (1.0 + together + alone) * 4.0).as_vec3().to_array();
                         }
                     }
@@ -380,6 +393,15 @@ mod tests {
             let error = (deviations.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / count / (count - 1.0)).sqrt();
             assert!(mean.abs() < 4.0 * error && error < 2e-3, "{mean} ± {error}");
         }
+    }
+
+    #[test]
+    fn rare_bright_samples_do_not_mislead_the_weights() {
+        // One in a hundred.
+        let bright = |random: f64| if random > 0.49 * 12f64.sqrt() { 100.0 } else { 0.0 };
+        let film = film_with(6, 8, 0.3, 0.1, bright);
+        let (plain, better) = (error(&film.mean()), error(&image(&film, WIDTH as u32)));
+        assert!(better < 0.7 * plain, "{better} is not far below {plain}");
     }
 
     #[test]
