@@ -39,13 +39,16 @@ void main() {
     Walk walk = Walk(0u, 0u, 0u);
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {
-#ifdef WITH_GRIDS
-            if (asked && !hit.blocked && advance_shadow(path, hit, true)) {
+            if (HAS_GRIDS && asked && !hit.blocked && advance_shadow(path, hit, true)) {
                 begin_ray(path, ray, grid, walk, hit);
                 continue;
             }
-#endif
-            vec4 found = asked ? end_connection(path, hit, first, second, pivot, weight, density, aimed) : vec4(0.0);
+            vec4 found = vec4(0.0);
+            if (HAS_GRIDS && asked && !hit.blocked) {
+                found = end_grid_connection(path, second, density);
+            } else if (asked && !hit.blocked) {
+                found = end_connection(path, hit, first, second, pivot, weight, density, aimed);
+            }
             if (next > 0u) {
                 store_pair(pairs, own, to, found);
             }

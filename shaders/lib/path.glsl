@@ -126,10 +126,10 @@ void scatter(inout Path path, Vertex vertex) {
     float lobe = HAS_LOBES || HAS_PHASES ? sample_set(path, 2u * path.segment + 2u).y : 0.0;
     Pivot pivot = Pivot(vec3(0.0), 0.0);
     Aim aim = Aim(vec3(0.0, 0.0, 1.0), 0.0, 0.0);
-#ifdef WITH_EQUIANGULAR
-    pivot = find_pivot(path, path.segment + 1u);
-    aim = find_aim(path, vertex, pivot);
-#endif
+    if (HAS_EQUIANGULAR) {
+        pivot = find_pivot(path, path.segment + 1u);
+        aim = find_aim(path, vertex, pivot);
+    }
     float scattered;
     BsdfSample next = sample_next(vertex, aim, u.zw, lobe, scattered);
     if (HAS_SHARING && HAS_EQUIANGULAR) {
@@ -267,8 +267,7 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
     if (HAS_MEDIA) {
         medium = MEDIUM(valid_medium(path.medium));
         bool voxels = HAS_VOXELS && (medium.grids & MEDIUM_VOXELS) != 0u;
-#ifdef WITH_GRIDS
-        if (voxels) {
+        if (HAS_VOXELS && voxels) {
             if (HAS_SHARING && path.sharing == 1u && path.depth == 1u) {
                 end = end_mean_flight(path, medium, t);
             } else {
@@ -276,9 +275,7 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
             }
         } else if (HAS_HEIGHTS && (medium.grids & MEDIUM_HEIGHT) != 0u) {
             end = end_height_flight(path, medium, t);
-        } else
-#endif
-        {
+        } else {
             end = end_flight(path, medium, t, surface_hit);
         }
         if (HAS_EMISSION && !voxels) {
@@ -336,11 +333,9 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
         if (HAS_GRIDS) {
             path.tau_mean += medium.sigma_t * way;
         }
-#ifdef WITH_OPEN_FLIGHTS
-        if (path.open) {
+        if (HAS_OPEN_FLIGHTS && path.open) {
             leave_open_flight(path, medium, way);
         }
-#endif
     }
     if (!surface_hit) {
         add_sky(path);
@@ -407,11 +402,9 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
 
 // Adds what a shadow ray brings, or takes it further.
 void path_light(inout Path path, Hit hit) {
-#ifdef WITH_GRIDS
-    if (!hit.blocked && advance_shadow(path, hit, false)) {
+    if (HAS_GRIDS && !hit.blocked && advance_shadow(path, hit, false)) {
         return;
     }
-#endif
     if (!hit.blocked) {
         vec3 transmittance = vec3(1.0);
         float survives = 1.0;

@@ -44,24 +44,21 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
         return end;
     }
     vec3 weights = HAS_CHROMATIC ? channel_weights(path.throughput) : vec3(0.0);
-    if (!mixed) {
+    if (!HAS_EQUIANGULAR || !mixed) {
         // Not the difference of two distances, which are rounded.
         end.way = free_flight(path.tau_left, HAS_ABSORBING ? medium.flight_share * sigma : sigma);
-#ifdef WITH_OPEN_FLIGHTS
-        if (path.open) {
+        if (HAS_OPEN_FLIGHTS && path.open) {
             end.way = path.way;
             vec3 collision = medium.sigma_t * exp_minus(medium.sigma_t * end.way);
             float free = HAS_CHROMATIC ? dot(weights, collision) : collision.x;
             end.weight /= open_factor(open_flight_of(path, medium), end.way, true, free);
         }
-#endif
         if (HAS_CHROMATIC) {
             end.weight *= scatter_weight(weights, path.tau_rgb + medium.sigma_t * end.way, medium.sigma_t, vec3(1.0));
         }
         end.weight *= rare_collision_weight(medium, end.way);
         return end;
     }
-#ifdef WITH_EQUIANGULAR
     float scatters = one_minus_exp_minus(sigma * way);
     float u = min(one_minus_exp_minus(path.tau_left) / scatters, 0.99999994);
     float share = medium.equiangular;
@@ -81,7 +78,6 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
     } else {
         end.weight = medium.albedo / (1.0 - share + share * scatters * density / (sigma * exp_minus(sigma * s)));
     }
-#endif
     return end;
 }
 
@@ -191,15 +187,11 @@ vec2 extinction_at(Medium medium, vec3 point) {
 
 // The albedo's factor at the end of a flight.
 vec3 albedo_factor(Medium medium, vec3 point) {
-#ifdef WITH_GRIDS
-    if ((medium.grids & MEDIUM_ALBEDO_GRID) == 0u) {
+    if (!HAS_GRIDS || (medium.grids & MEDIUM_ALBEDO_GRID) == 0u) {
         return vec3(1.0);
     }
     Grid grid = GRID(medium.grids & 0xffffffu);
     return grid_value(grid, grid_local(grid, point));
-#else
-    return vec3(1.0);
-#endif
 }
 
 // A stretch of a shadow ray from t_min to t_end, within one medium. Where nothing passes, its mean optical depth is known only where the

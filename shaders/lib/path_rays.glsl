@@ -40,12 +40,10 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
         // In order: what lies between boundaries is not known before.
         bool counts = begins && t < path.t_max && primitive.light != path.light + 1u;
         bool passes = HAS_BOUNDARIES && (primitive.surface & PRIMITIVE_BOUNDARY) != 0u;
-#ifdef WITH_MASK // it stands here once for each primitive of the kernel
         if (HAS_MASK && counts && !passes) {
             Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
             passes = (surface.flags & SURFACE_MASK) != 0u && opacity_at(surface, primitive, index, path.origin + path.direction * t, barycentric, path.direction) < 1.0;
         }
-#endif
         hit.blocked = hit.blocked || (counts && !passes);
         if (counts && passes && (t < hit.t || (t == hit.t && index < hit.primitive && hit.primitive != NONE))) {
             hit.t = t;
@@ -58,7 +56,6 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
         bool counts = begins && t < path.t_max;
         // The light itself is not in the way of its light.
         bool opaque = counts && !boundary && primitive.light != path.light + 1u;
-#ifdef WITH_MASK
         if (HAS_MASK && opaque) {
             Surface surface = SURFACE(primitive.surface & ~(PRIMITIVE_BOUNDARY | PRIMITIVE_SPHERE));
             if ((surface.flags & SURFACE_MASK) != 0u) {
@@ -71,7 +68,6 @@ void record(Path path, uint index, Primitive primitive, float t, bool along_norm
                 boundary = true;
             }
         }
-#endif
         if ((HAS_BOUNDARIES || HAS_MASK) && HAS_MEDIA) {
             float way = (shadow_length(path) - t) * (along_normal ? -1.0 : 1.0);
             hit.tau += counts && boundary ? primitive.sigma_t_step * way : 0.0;

@@ -260,22 +260,18 @@ float connection_factor(Path path, Hit hit, End first, End second, Pivot pivot, 
     return open_factor(flight, way, ends, ends ? free : mean_passage(weights, medium.sigma_t * way));
 }
 
-// What a connection whose ray has been traced brings in each channel, and its density by the flight of the first vertex, which chooses one.
+// What a connection through fields brings in each channel: an estimate of what passes, and a density that is known.
+vec4 end_grid_connection(Path path, End second, float density) {
+    vec2 extinction = vec2(1.0);
+    if (second.kind == END_MEDIUM) {
+        extinction = extinction_at(MEDIUM(second.medium), second.point);
+    }
+    vec3 passes = density * extinction.x * path.light_passes * exp_minus(path.tau_rgb);
+    return vec4(passes, density * extinction.y * exp_minus(path.tau_mean.x));
+}
+
+// What a connection whose ray has arrived brings in each channel, and its density by the flight of the first vertex, which chooses one.
 vec4 end_connection(Path path, Hit hit, End first, End second, Pivot pivot, vec3 weight, float density, float aimed) {
-    if (hit.blocked) {
-        return vec4(0.0);
-    }
-#ifdef WITH_GRIDS
-    {
-        // Of voxels there is an estimate of what passes, and a density that is known.
-        vec2 extinction = vec2(1.0);
-        if (second.kind == END_MEDIUM) {
-            extinction = extinction_at(MEDIUM(second.medium), second.point);
-        }
-        vec3 passes = density * extinction.x * path.light_passes * exp_minus(path.tau_rgb);
-        return vec4(passes, density * extinction.y * exp_minus(path.tau_mean.x));
-    }
-#endif
     vec3 passes = vec3(density);
     if (HAS_MEDIA) {
         passes *= HAS_CHROMATIC ? exp_minus(max(hit.tau_rgb, vec3(0.0))) : vec3(exp_minus(max(hit.tau, 0.0)));
@@ -283,10 +279,7 @@ vec4 end_connection(Path path, Hit hit, End first, End second, Pivot pivot, vec3
     }
     vec3 weights = HAS_CHROMATIC ? channel_weights(weight) : vec3(0.0);
     float found = HAS_CHROMATIC ? dot(weights, passes) : passes.x;
-    float factor = 1.0;
-#ifdef WITH_OPEN_FLIGHTS
-    factor = aimed * connection_factor(path, hit, first, second, pivot, weights, found / density);
-#endif
+    float factor = HAS_EQUIANGULAR ? aimed * connection_factor(path, hit, first, second, pivot, weights, found / density) : 1.0;
     return vec4(passes, factor * found);
 }
 

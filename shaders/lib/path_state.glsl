@@ -208,9 +208,9 @@ void begin_segment(inout Path path, vec2 u) {
             path.tau_rgb = vec3(0.0);
             path.channel = sample_channel(channel_weights(path.throughput), u.y);
         }
-#ifdef WITH_OPEN_FLIGHTS
-        begin_open_flight(path, u.x);
-#endif
+        if (HAS_OPEN_FLIGHTS) {
+            begin_open_flight(path, u.x);
+        }
     }
     if (HAS_GRIDS) {
         path.collisions = 0u;

@@ -6,6 +6,7 @@ pub mod buffer;
 pub mod device;
 pub mod kernel;
 mod pipeline;
+mod prune;
 pub mod renderer;
 pub mod shader;
 

@@ -1,6 +1,7 @@
 //! From GLSL to SPIR-V: includes, generated files, the compiler, and a cache.
 
 use super::Error;
+use super::prune::prune;
 use crate::pack::{features::Features, immediate, layout};
 use glslang::{
     Compiler, CompilerOptions, Shader, ShaderInput, ShaderSource, ShaderStage, SpirvVersion, Target, VulkanVersion,
@@ -168,8 +169,13 @@ impl Expansion<'_> {
     }
 }
 
-/// Compiles a kernel to SPIR-V 1.3, the newest that naga reads completely.
+/// Compiles a kernel to SPIR-V 1.3, the newest that naga reads completely, without what its constants rule out.
 pub fn compile(source: &ShaderSourceText) -> Result<Vec<u32>, Error> {
+    prune(&translate(source)?).map_err(|log| Error::Shader { name: source.name.clone(), log })
+}
+
+/// The same with all of it.
+pub(super) fn translate(source: &ShaderSourceText) -> Result<Vec<u32>, Error> {
     let failed = |log: String| Error::Shader { name: source.name.clone(), log };
     let compiler = Compiler::acquire().ok_or_else(|| failed("glslang does not start".to_owned()))?;
     let text = ShaderSource::from(source.text.as_str());
@@ -187,7 +193,7 @@ pub fn compile(source: &ShaderSourceText) -> Result<Vec<u32>, Error> {
 /// Compiles a kernel, or takes it from the cache if the very same text was compiled before.
 pub fn compile_cached(source: &ShaderSourceText) -> Result<Vec<u32>, Error> {
     let Some(folder) = cache_folder().map(|folder| folder.join("spirv")) else { return compile(source) };
-    let key = Sha256::digest(format!("{} {}", env!("CARGO_PKG_VERSION"), source.text));
+    let key = Sha256::digest(format!("{} pruned {}", env!("CARGO_PKG_VERSION"), source.text));
     let name: String = key.iter().map(|byte| format!("{byte:02x}")).collect();
     let path = folder.join(name + ".spv");
     if let Ok(bytes) = std::fs::read(&path)

@@ -323,6 +323,7 @@ impl Features {
             ("HAS_PILOT", self.pilot),
             ("HAS_SEALED", self.sealed),
             ("HAS_SHARING", self.sharers > 0),
+            ("HAS_OPEN_FLIGHTS", self.equiangular && self.sharers > 0),
             ("HAS_SEEN", self.seen),
         ]
         .map(|(name, value)| format!("const bool {name} = {value};\n"))
@@ -335,15 +336,6 @@ impl Features {
         ]
         .map(|(name, value)| format!("const uint {name} = {value}u;\n"))
         .concat();
-        // What is large is left out before drivers see it: they take their time for what they then leave out.
-        let macros = [
-            ("WITH_MASK", self.masks),
-            ("WITH_GRIDS", self.grids),
-            ("WITH_EQUIANGULAR", self.equiangular),
-            ("WITH_OPEN_FLIGHTS", self.equiangular && self.sharers > 0),
-        ]
-        .map(|(name, value)| if value { format!("#define {name}\n") } else { String::new() })
-        .concat();
-        switches + &numbers + &macros
+        switches + &numbers
     }
 }

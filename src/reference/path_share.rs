@@ -225,6 +225,16 @@ fn connection_factor(tables: &Tables, path: &Path, hit: &Hit, to: &Record, from:
     open_factor(&flight, way, ends, free)
 }
 
+/// What a connection through fields brings in each channel: an estimate of what passes, and a density that is known.
+fn end_grid_connection(tables: &Tables, path: &Path, to: &Record, density: f64) -> (DVec3, f64) {
+    let [truly, known] = match to.second.kind {
+        Kind::Medium => extinction_at(tables, medium_at(tables, to.second.medium), to.second.point),
+        _ => [1.0; 2],
+    };
+    let passes = density * truly * path.light_passes * exp_minus_rgb(path.tau_rgb);
+    (passes, density * known * exp_minus(path.tau_mean.x))
+}
+
 /// What a connection brings in each channel, and its density as the flight of the first vertex chooses one.
 fn end_connection(
     tables: &Tables,
@@ -235,18 +245,6 @@ fn end_connection(
     density: f64,
     aimed: f64,
 ) -> (DVec3, f64) {
-    if hit.blocked {
-        return (DVec3::ZERO, 0.0);
-    }
-    if tables.features.grids {
-        // Of voxels there is an estimate of what passes, and a density that is known.
-        let [truly, known] = match to.second.kind {
-            Kind::Medium => extinction_at(tables, medium_at(tables, to.second.medium), to.second.point),
-            _ => [1.0; 2],
-        };
-        let passes = density * truly * path.light_passes * exp_minus_rgb(path.tau_rgb);
-        return (passes, density * known * exp_minus(path.tau_mean.x));
-    }
     let mut passes = density * exp_minus_rgb(hit.tau_rgb.max(DVec3::ZERO));
     if to.second.kind == Kind::Medium {
         passes *= medium_at(tables, to.second.medium).sigma_t;
@@ -267,6 +265,12 @@ fn connect(tables: &Tables, from: &Record, to: &Record, number: u32) -> (DVec3, 
     let mut hit = super::traverse(tables, &path);
     while tables.features.grids && !hit.blocked && advance_shadow(tables, &mut path, &mut hit, true) {
         hit = super::traverse(tables, &path);
+    }
+    if hit.blocked {
+        return (DVec3::ZERO, 0.0);
+    }
+    if tables.features.grids {
+        return end_grid_connection(tables, &path, to, density);
     }
     end_connection(tables, &path, &hit, to, from, density, aimed)
 }
