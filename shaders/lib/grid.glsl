@@ -124,11 +124,16 @@ const uint WALK_DELTA = 0u;
 const uint WALK_RESIDUAL = 1u;
 const uint WALK_MEAN = 2u;
 
+// Where the numbers of a cell begin: the largest, the smallest and the mean extinction coefficient, and the rate of delta tracking.
+uint cell_numbers(Grid grid, uvec3 cell) {
+    return grid.first_cell + 4u * ((cell.z * grid.cells_y + cell.y) * grid.cells_x + cell.x);
+}
+
 // Goes on to the next tentative collision, at an optical depth tau of them, which loses what the way takes; false if the walk ends
 // before.
 bool walk_to_collision(Grid grid, uint kind, inout GridWalk walk, inout float tau) {
     [[dont_unroll]] while (walk.t < walk.end) {
-        uint first = grid.first_cell + 4u * uint((walk.cell.z * int(grid.cells_y) + walk.cell.y) * int(grid.cells_x) + walk.cell.x);
+        uint first = cell_numbers(grid, uvec3(walk.cell));
         float most = VALUE(first), least = VALUE(first + 1u), mean = VALUE(first + 2u);
         float rate = kind == WALK_DELTA ? VALUE(first + 3u) : (kind == WALK_RESIDUAL ? most - least : mean);
         vec3 side = vec3(walk.cell) + mix(vec3(0.0), vec3(1.0), greaterThan(walk.direction, vec3(0.0)));
@@ -165,8 +170,7 @@ bool walk_to_collision(Grid grid, uint kind, inout GridWalk walk, inout float ta
 // The mean of the cell in which a point of the unit cube lies.
 float grid_mean(Grid grid, vec3 local) {
     vec3 cells = vec3(grid.cells_x, grid.cells_y, grid.cells_z);
-    uvec3 cell = uvec3(clamp(floor(local * cells), vec3(0.0), cells - 1.0));
-    return VALUE(grid.first_cell + 4u * ((cell.z * grid.cells_y + cell.y) * grid.cells_x + cell.x) + 2u);
+    return VALUE(cell_numbers(grid, uvec3(clamp(floor(local * cells), vec3(0.0), cells - 1.0))) + 2u);
 }
 
 // Four numbers of a stream.

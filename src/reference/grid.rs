@@ -3,7 +3,7 @@
 use super::math::{exp_minus, max_component, minus_log_1m, one_minus_exp_minus};
 use super::rng::{pcg4d, to_unit};
 use crate::pack::layout::{self, GRID_CLAMP, GRID_MIRROR, GRID_NEAREST, GRID_RGB};
-use glam::{DVec2, DVec3, DVec4, IVec3};
+use glam::{DVec2, DVec3, DVec4, IVec3, UVec3};
 
 /// Longest distance.
 const INFINITE_DISTANCE: f64 = layout::INFINITE_DISTANCE as f64;
@@ -161,13 +161,17 @@ pub enum Rate {
     Mean,
 }
 
+/// The numbers of a cell: the largest, the smallest and the mean extinction coefficient, and the rate of delta tracking.
+fn cell_numbers(values: &[f32], grid: &Grid, cell: UVec3) -> [f64; 4] {
+    let first = grid.first_cell + 4 * ((cell.z * grid.cells[1] + cell.y) * grid.cells[0] + cell.x);
+    [0, 1, 2, 3].map(|number| f64::from(values[first as usize + number]))
+}
+
 /// Goes on to the next tentative collision, at an optical depth `tau` of them; false if the walk ends before.
 pub fn walk_to_collision(values: &[f32], grid: &Grid, kind: Rate, walk: &mut GridWalk, tau: &mut f64) -> bool {
     let counts = IVec3::from_array(grid.cells.map(|count| count as i32));
     while walk.t < walk.end {
-        let first = (walk.cell.z * counts.y + walk.cell.y) * counts.x + walk.cell.x;
-        let first = (grid.first_cell + 4 * first as u32) as usize;
-        let [most, least, mean, rate] = [0, 1, 2, 3].map(|k| f64::from(values[first + k]));
+        let [most, least, mean, rate] = cell_numbers(values, grid, walk.cell.as_uvec3());
         let rate = match kind {
             Rate::Delta => rate,
             Rate::Residual => most - least,
@@ -202,9 +206,8 @@ pub fn walk_to_collision(values: &[f32], grid: &Grid, kind: Rate, walk: &mut Gri
 
 /// The mean of the cell in which a point of the unit cube lies.
 pub fn grid_mean(values: &[f32], grid: &Grid, local: DVec3) -> f64 {
-    let cell = (local * grid.cell_counts()).floor().clamp(DVec3::ZERO, grid.cell_counts() - 1.0).as_uvec3();
-    let index = (cell.z * grid.cells[1] + cell.y) * grid.cells[0] + cell.x;
-    f64::from(values[(grid.first_cell + 4 * index) as usize + 2])
+    let cell = (local * grid.cell_counts()).floor().clamp(DVec3::ZERO, grid.cell_counts() - 1.0);
+    cell_numbers(values, grid, cell.as_uvec3())[2]
 }
 
 /// Four numbers of a stream.
