@@ -61,16 +61,19 @@ struct Flow {
     reached: HashSet<Word>,
     /// From block to block.
     edges: HashSet<(Word, Word)>,
+    /// Labels of the blocks at which loops begin.
+    heads: HashSet<Word>,
 }
 
 impl Flow {
-    /// Nothing, where values are joined at the head of a loop or where it goes on: glslang keeps such values in memory, so loops need
-    /// no thought of their own.
+    /// Nothing, for a function that joins values at the head of a loop or at its continue target: it stays as it is. glslang keeps such
+    /// values in memory.
     fn of(function: &Function, constants: &HashMap<Word, bool>) -> Option<Flow> {
         let joins: HashSet<Word> = (function.blocks.iter())
             .filter(|block| block.instructions.iter().any(|instruction| instruction.class.opcode == Op::Phi))
             .filter_map(Block::label_id)
             .collect();
+        let mut heads = HashSet::new();
         let mut truths: HashMap<Word, Truth> =
             constants.iter().map(|(id, value)| (*id, Truth::Always(*value))).collect();
         for block in &function.blocks {
@@ -78,6 +81,9 @@ impl Flow {
             for instruction in &block.instructions {
                 match instruction.class.opcode {
                     Op::LoopMerge if joins.contains(&label) || joins.contains(&id(instruction, 1)?) => return None,
+                    Op::LoopMerge => {
+                        heads.insert(label);
+                    }
                     Op::Phi | Op::LogicalAnd | Op::LogicalOr | Op::LogicalNot => {
                         truths.insert(instruction.result_id?, Truth::Unreached);
                     }
@@ -85,9 +91,9 @@ impl Flow {
                 }
             }
         }
-        let mut flow = Flow { truths, reached: HashSet::new(), edges: HashSet::new() };
+        let mut flow = Flow { truths, reached: HashSet::new(), edges: HashSet::new(), heads };
         flow.reached.insert(function.blocks.first()?.label_id()?);
-        // Values and ways are only ever added, so this ends.
+        // Ways are only ever added, and values only ever become less certain, so this ends.
         while function.blocks.iter().fold(false, |changed, block| flow.pass(block).unwrap_or(false) | changed) {}
         Some(flow)
     }
@@ -137,18 +143,21 @@ impl Flow {
                 _ => Vec::new(),
             };
         }
-        let way = |index| id(last, index);
-        match way(0).map(|condition| self.truth(condition)) {
-            Some(Truth::Unreached) => Vec::new(),
-            Some(Truth::Always(value)) => way(if value { 1 } else { 2 }).into_iter().collect(),
-            _ => way(1).into_iter().chain(way(2)).collect(),
+        let [Some(condition), Some(yes), Some(no)] = [0, 1, 2].map(|index| id(last, index)) else { return Vec::new() };
+        match self.truth(condition) {
+            Truth::Unreached => Vec::new(),
+            // A loop keeps its way back, even if it is never taken: that makes it a loop.
+            Truth::Always(true) if !self.heads.contains(&no) => vec![yes],
+            Truth::Always(false) if !self.heads.contains(&yes) => vec![no],
+            _ => vec![yes, no],
         }
     }
 
-    /// Leaves out blocks that are not reached, and branches to them.
+    /// Leaves out blocks that are not reached, and branches to them. Of those that structure asks for, the ends of constructs stay as
+    /// places that are never reached, and the continue targets of loops as ways back to their heads.
     fn rewrite(&self, function: &mut Function) {
         let is_reached = |block: &Block| block.label_id().is_some_and(|label| self.reached.contains(&label));
-        // Blocks that structure asks for: the ends of constructs, and where loops go on, with the heads of those.
+        // The ends of constructs, and continue targets with their heads.
         let (mut ends, mut continues) = (HashSet::new(), HashMap::new());
         for block in function.blocks.iter_mut().filter(|block| is_reached(block)) {
             self.rewrite_branch(block);
@@ -200,8 +209,9 @@ impl Flow {
 fn either_decides(one: Truth, two: Truth, decisive: bool) -> Truth {
     match (one, two) {
         (Truth::Always(value), _) | (_, Truth::Always(value)) if value == decisive => Truth::Always(decisive),
+        (Truth::Unreached, _) | (_, Truth::Unreached) => Truth::Unreached,
         (Truth::Always(_), other) | (other, Truth::Always(_)) => other,
-        (one, two) => one.join(two),
+        _ => Truth::Either,
     }
 }
 
@@ -215,7 +225,7 @@ fn incoming(phi: &Instruction) -> impl Iterator<Item = (Word, Word)> {
     phi.operands.chunks_exact(2).filter_map(|pair| Some((pair[0].id_ref_any()?, pair[1].id_ref_any()?)))
 }
 
-/// Leaves functions that nothing calls.
+/// Leaves out functions that no entry point reaches.
 fn drop_uncalled(module: &mut Module) {
     let called: HashMap<Word, Vec<Word>> = (module.functions.iter())
         .filter_map(|function| {
@@ -261,9 +271,50 @@ mod tests {
         module.all_inst_iter().filter(|instruction| instruction.class.opcode == opcode).count()
     }
 
+    /// Asserts that all blocks that are named are there, that each loop has one way back, and that phis have a value for each block that
+    /// comes before.
+    fn check_structure(module: &Module) {
+        for function in &module.functions {
+            let labels: Vec<Word> = function.blocks.iter().filter_map(Block::label_id).collect();
+            let place = |label: Word| labels.iter().position(|other| *other == label).expect("a block that is there");
+            let mut before = vec![HashSet::new(); labels.len()];
+            for (from, block) in function.blocks.iter().enumerate() {
+                let last = block.instructions.last().unwrap();
+                let skipped = match last.class.opcode {
+                    Op::Branch => 0,
+                    Op::BranchConditional | Op::Switch => 1,
+                    _ => continue,
+                };
+                for target in last.operands.iter().filter_map(Operand::id_ref_any).skip(skipped) {
+                    before[place(target)].insert(from);
+                }
+            }
+            for (index, instruction) in (function.blocks.iter().enumerate())
+                .flat_map(|(index, block)| block.instructions.iter().map(move |instruction| (index, instruction)))
+            {
+                match instruction.class.opcode {
+                    Op::SelectionMerge => assert!(place(id(instruction, 0).unwrap()) > index),
+                    Op::LoopMerge => {
+                        assert!(
+                            place(id(instruction, 0).unwrap()) > index && place(id(instruction, 1).unwrap()) > index
+                        );
+                        assert_eq!(before[index].iter().filter(|from| **from >= index).count(), 1, "ways back");
+                    }
+                    Op::Phi => {
+                        let from: HashSet<usize> = incoming(instruction).map(|(_, from)| place(from)).collect();
+                        assert_eq!(from, before[index]);
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+
     /// Branches and functions that are left of a body.
     fn left(body: &str) -> (usize, usize) {
-        let [_, after] = kernel(body);
+        let [before, after] = kernel(body);
+        check_structure(&before);
+        check_structure(&after);
         (count(&after, Op::BranchConditional), after.functions.len())
     }
 
@@ -276,6 +327,11 @@ mod tests {
         assert_eq!(left("if (!YES || (NO && some)) { values[0] = f(); return; } values[0] = g();"), (0, 2));
         assert_eq!(left("values[0] = YES ? g() : f();"), (0, 2));
         assert_eq!(left("for (uint i = 0u; NO && i < values[2]; i++) { values[i] = f(); }"), (0, 1));
+        assert_eq!(left("do { values[0] = g(); } while (NO && some);"), (1, 2));
+        assert_eq!(
+            left("while (some || YES) { if (some && NO) { values[0] = f(); } else if (values[2] > 1u) { break; } }"),
+            (1, 1)
+        );
         assert_eq!(left("while (true) { values[0] = g(); if (YES) { break; } values[1] = f(); }"), (0, 2));
     }
 
@@ -283,6 +339,7 @@ mod tests {
     fn what_they_leave_open_stays() {
         assert_eq!(left("if (some) { values[0] = f(); } else { values[0] = g(); }"), (1, 3));
         assert_eq!(left("if (YES && some) { values[0] = f(); }"), (1, 2));
+        assert_eq!(left("if (some) { values[0] = f(); return; } else { values[0] = g(); return; }"), (1, 3));
         assert_eq!(left("if (NO || some) { values[0] = f(); } else { values[0] = g(); }"), (1, 3));
         assert_eq!(left("bool all = true; if (some) { all = false; } if (all) { values[0] = f(); }"), (2, 2));
         assert_eq!(

@@ -174,7 +174,7 @@ pub fn compile(source: &ShaderSourceText) -> Result<Vec<u32>, Error> {
     prune(&translate(source)?).map_err(|log| Error::Shader { name: source.name.clone(), log })
 }
 
-/// The same with all of it.
+/// The same without leaving anything out.
 pub(super) fn translate(source: &ShaderSourceText) -> Result<Vec<u32>, Error> {
     let failed = |log: String| Error::Shader { name: source.name.clone(), log };
     let compiler = Compiler::acquire().ok_or_else(|| failed("glslang does not start".to_owned()))?;
@@ -190,10 +190,11 @@ pub(super) fn translate(source: &ShaderSourceText) -> Result<Vec<u32>, Error> {
     shader.compile().map_err(|error| failed(error.to_string()))
 }
 
-/// Compiles a kernel, or takes it from the cache if the very same text was compiled before.
+/// Compiles a kernel, or takes it from the cache if the very same text was compiled before by the same program.
 pub fn compile_cached(source: &ShaderSourceText) -> Result<Vec<u32>, Error> {
     let Some(folder) = cache_folder().map(|folder| folder.join("spirv")) else { return compile(source) };
-    let key = Sha256::digest(format!("{} pruned {}", env!("CARGO_PKG_VERSION"), source.text));
+    let pass = include_str!("prune.rs");
+    let key = Sha256::digest(format!("{} {pass} {}", env!("CARGO_PKG_VERSION"), source.text));
     let name: String = key.iter().map(|byte| format!("{byte:02x}")).collect();
     let path = folder.join(name + ".spv");
     if let Ok(bytes) = std::fs::read(&path)
