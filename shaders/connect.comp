@@ -65,12 +65,14 @@ void main() {
                 break;
             }
             if (next == 0u) {
-                uint in_tile = quotient(slot, count), record = record_of(first_slot + slot);
-                place = uvec2(in_tile % TILE, in_tile / TILE);
-                of_pixel = slot - in_tile * count;
+                // The pixels of a group one after the other: their rays to the same point are alike, and take the same way through the tree.
+                uint of_group = slot / SHARERS, group = quotient(of_group, count);
+                of_pixel = of_group - group * count;
+                own = slot % SHARERS;
+                place = sharer_place(group_place(group), own);
+                uint record = record_of(first_slot + (place.y * TILE + place.x) * count + of_pixel);
                 origin = corner - group_offset(SHARERS, push.work.first_sample + of_pixel);
-                own = sharer_number(place);
-                pairs = pairs_of(gl_WorkGroupID.x * (samples_in_tile / SHARERS) + group_in_tile(place) * count + of_pixel);
+                pairs = pairs_of(gl_WorkGroupID.x * (samples_in_tile / SHARERS) + of_group);
                 first = load_end(record, 0u);
                 first.kind = all(lessThan(origin + place, size)) ? first.kind : END_NONE;
                 vec4 left = SAMPLE(record + 2u);

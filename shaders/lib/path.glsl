@@ -52,6 +52,7 @@ void path_start(inout Path path, uvec2 pixel) {
     if (HAS_SHARING) {
         uvec2 group = (pixel + group_offset(SHARERS, path.sample_index)) / SHARE_SIZE;
         path.group = group.y * params.film_width + group.x;
+        path.member = sharer_number(pixel + group_offset(SHARERS, path.sample_index));
     }
     vec4 u = sample_camera(path);
     vec2 place = vec2(column, row) + u.xy;
@@ -429,7 +430,7 @@ void path_light(inout Path path, Hit hit) {
             survives = 1.0;
             transmittance = float(hit.medium) == LIGHT(path.light).edge_1.y ? transmittance : vec3(0.0);
         }
-        path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
+        path.radiance += path.light_weight * transmittance * power_heuristic(path.pdf_ratio * survives);
         if (HAS_SHARING && HAS_HENYEY_GREENSTEIN && path.sharing == 2u && path.depth == 2u) {
             share_part(path, 1u, path.direction);
         }

@@ -8,11 +8,20 @@
 #include "lib/texture.glsl"
 #include "lib/grid.glsl"
 
-// Weight of a direction found by scattering that light sampling finds with density light_pdf: the balance heuristic (Veach and
-// Guibas 1995). Scattering finds the light only if the flight survives, so its probability to do so is part of the density.
+// Weight of what one way to the light finds, if another finds it with `ratio` times its density: the power heuristic with the exponent 2
+// (Veach and Guibas 1995). Light sampling alone has little variance, so what scattering finds by chance must count for little beside it.
+float power_heuristic(float ratio) {
+    return 1.0 / (1.0 + ratio * ratio);
+}
+
+// Weight of a direction found by scattering that light sampling finds with density light_pdf. Scattering finds the light only if the flight
+// survives, so its probability to do so is part of the density.
 float scattering_mis_weight(Path path, float survival, float light_pdf) {
     float found = HAS_MIS ? path.pdf * survival : 0.0;
-    return path.pdf == 0.0 || light_pdf == 0.0 ? 1.0 : found / (found + light_pdf);
+    if (path.pdf == 0.0 || light_pdf == 0.0) {
+        return 1.0;
+    }
+    return found > light_pdf ? power_heuristic(light_pdf / found) : 1.0 - power_heuristic(found / light_pdf);
 }
 
 bool emitters_seen(Path path) {
@@ -165,7 +174,11 @@ bool sample_light(inout Path path, Vertex vertex, Aim aim, vec2 u, vec2 decision
     } else if (HAS_DIRECTIONAL_LIGHTS && light.kind == LIGHT_DIRECTIONAL) {
         found = sample_directional_light(light);
     } else if (is_envmap(light)) {
-        SkySample sky = sample_sky(TEXTURE(light.kind >> LIGHT_TEXTURE_SHIFT), u, decision);
+        if (HAS_MANY_LIGHTS) {
+            // The digits that went into the choice of the light.
+            u.x += decision.x / (SKY_STEPS * light.probability);
+        }
+        SkySample sky = sample_sky(TEXTURE(light.kind >> LIGHT_TEXTURE_SHIFT), u);
         found = LightSample(from_envmap(light, sky.direction), INFINITE_DISTANCE, sky.radiance / sky.pdf, sky.pdf);
     } else if (HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE) {
         found = sample_sphere_light(light, vertex.point, u);

@@ -88,12 +88,7 @@ void store_pair(uint pairs, uint i, uint j, vec4 density) {
     }
 }
 
-// Number of the group of a place among those of a tile, and its first place.
-uint group_in_tile(uvec2 place) {
-    place /= SHARE_SIZE;
-    return place.y * (TILE / SHARE_SIZE.x) + place.x;
-}
-
+// The first place of a group of a tile.
 uvec2 group_place(uint group) {
     return uvec2(group % (TILE / SHARE_SIZE.x), group / (TILE / SHARE_SIZE.x)) * SHARE_SIZE;
 }

@@ -20,6 +20,7 @@ struct Path {
     uint pixel;             // of the whole film
     uint sample_index;
     uint group;             // where pixels share paths: of this sample
+    uint member;            // and the pixel's number in it
     float filter_weight;    // where the filter is wide: factor of the radiance; negative in its negative lobes
     // The ray that is asked for.
     vec3 origin;
@@ -126,8 +127,11 @@ vec4 sample_camera(Path path) {
 vec4 vertex_numbers(Path path, uint segment) {
     vec4 own = sample_set(path, 2u * segment + 1u);
     if (HAS_SHARING && segment == 0u) {
-        // Light that the first vertex samples is not shared, and better spread over the whole render.
+        // Light that the first vertex samples is not shared, and better spread over the whole render; directions to what is shared are
+        // better spread over the group.
         own.xy = numbers_of_set(params.seed, path.pixel, 1u, path.sample_index).xy;
+        uint index = group_index(path.sample_index) * SHARERS + path.member;
+        own.zw = numbers_of_set(group_seed(params.seed, path.sample_index), path.group, 1u, index).zw;
     }
     return own;
 }

@@ -2,7 +2,7 @@
 // (see src/pack/sobol.rs), with a random digital shift for each pixel; later sets are hashed.
 //
 // Where pixels share paths, the free flight and the channel of the camera's segment are those of the whole group: first vertices at the
-// same depth find each other's second vertices most easily.
+// same depth find each other's second vertices most easily. The directions from first vertices are those of one sequence for the group.
 //
 // The dimensions are named, so that a feature that a scene lacks never shifts the numbers of another:
 //   set 0          pixel x, pixel y, free flight, channel        of the camera's segment

@@ -1,6 +1,7 @@
-// Unit kernel of lib/sky.glsl, of the map whose texture comes first: (u, v, decision), (unit direction, 0) in; (sampled direction,
+// Unit kernel of lib/sky.glsl, of the map whose texture comes first: (u, v, 0, 0), (unit direction, 0) in; (sampled direction,
 // density), (its radiance, 0), (radiance from the direction asked for, its density), (its u, v, 0, 0) out.
 #version 460
+#extension GL_EXT_control_flow_attributes : require
 #include "lib/layout.glsl"
 #define VALUE(i) values[i]
 
@@ -15,7 +16,7 @@ void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i < uint(inputs.length()) / 2u) {
         Texture sky = textures[0];
-        SkySample found = sample_sky(sky, inputs[2u * i].xy, inputs[2u * i].zw);
+        SkySample found = sample_sky(sky, inputs[2u * i].xy);
         vec3 direction = inputs[2u * i + 1u].xyz;
         vec2 uv = sky_uv(direction);
         outputs[4u * i] = vec4(found.direction, found.pdf);

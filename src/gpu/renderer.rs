@@ -14,6 +14,9 @@ use std::sync::Arc;
 
 /// Most vectors of four numbers, of 16 bytes, for samples in flight: one each, and more where pixels share paths.
 const MAX_VECTORS: usize = 1 << 23;
+/// Bytes of them for each core where the device is a CPU, and the fewest: what it has to touch first is time before the first sample.
+const CORE_BYTES: u64 = 16 << 20;
+const LEAST_BYTES: u64 = 32 << 20;
 /// Bindings of the path tracer; the first [`ADDRESSES`] can also be read by address.
 const BINDINGS: u32 = 13;
 const ADDRESSES: usize = 12;
@@ -95,8 +98,8 @@ impl Renderer {
         }
         let crop = [packed.params.crop_width, packed.params.crop_height];
         let pixels = tile_count(crop, sharers as u32) as usize * TILE_PIXELS;
-        let most = if variant.buffer_reference { u64::MAX } else { device.max_binding };
-        let capacity = capacity(pixels, sharers, most);
+        let bound = if variant.buffer_reference { u64::MAX } else { device.max_binding };
+        let capacity = capacity(pixels, sharers, bound.min(samples_bytes(device.is_cpu)));
         Ok(Renderer {
             device: device.clone(),
             path_trace,
@@ -112,7 +115,7 @@ impl Renderer {
         })
     }
 
-    /// Bytes that a crop window of so many pixels takes on the device, and on the host for the blocks of one dispatch; both
+    /// Bytes that a crop window of so many pixels takes at most on the device, and on the host for the blocks of one dispatch; both
     /// beside the tables of the scene.
     pub fn working_memory(crop: [u32; 2], sharers: u32) -> (u64, u64) {
         let pixels = tile_count(crop, sharers) as usize * TILE_PIXELS;
@@ -253,6 +256,12 @@ fn render_all(renderer: &mut Renderer, samples: Range<u32>) -> Result<Vec<Block>
         first = last;
     }
     Ok(blocks)
+}
+
+/// Bytes that samples in flight may take.
+fn samples_bytes(is_cpu: bool) -> u64 {
+    let cores = std::thread::available_parallelism().map_or(1, |count| count.get() as u64);
+    if is_cpu { LEAST_BYTES.max(cores * CORE_BYTES) } else { u64::MAX }
 }
 
 /// Samples in flight for so many pixels, if a buffer may have `most` bytes.

@@ -1,26 +1,26 @@
 //! Environment maps as tables: their pixels, and the distribution by which directions to them are sampled.
 //!
-//! The distribution is a grid of cells of equal solid angle, uniform in the azimuth and in the height y: a row is drawn by an alias
-//! table, then a column by the table of that row. A cell's weight is the integral of the bilinear radiance over it, mean of the
-//! channels, by exact integration along the rows of the image and Gauss's rule across, so that no pixel falls between the cells,
+//! The distribution is a grid of cells of equal solid angle, uniform in the azimuth and in the height y: a row is drawn by the sums of
+//! the rows' probabilities, then a column by those of that row. A cell's weight is the integral of the bilinear radiance over it, mean of
+//! the channels, by exact integration along the rows of the image and Gauss's rule across, so that no pixel falls between the cells,
 //! however fine the image. A share of each choice is uniform, which covers what the weights make too little of.
 //!
-//! Thresholds are multiples of 2⁻¹³, and the density in the table is that of the rounded thresholds: it is exactly the density of
-//! what is drawn.
+//! The sums are rounded to multiples of 2⁻²⁴, and densities are those of the rounded ones: exactly what is drawn.
 
 use super::layout::{TEXTURE_SKY, Texture};
-use super::lights::alias_table;
 use crate::scene::Bitmap;
 use std::f64::consts::PI;
 
 /// Share of the choice of a row, and of a column within it, that is uniform.
 const UNIFORM_SHARE: f64 = 1.0 / 16.0;
-/// Steps of the thresholds.
-const THRESHOLDS: f64 = 8192.0;
-/// The coarsest and the finest grid: powers of two of columns and rows. 2048 columns are as many as an alias of eleven bits can
-/// name.
-const COLUMNS: [u32; 2] = [4, 11];
-const ROWS: [u32; 2] = [3, 10];
+/// Steps of the sums.
+const STEPS: f64 = 16_777_216.0;
+/// The coarsest grid, the finest that is finer than its image, and the finest of all: powers of two of columns and rows. Even with the
+/// uniform share alone a cell has hundreds of steps.
+const COLUMNS: [u32; 3] = [4, 10, 11];
+const ROWS: [u32; 3] = [3, 9, 10];
+/// By so many powers of two the grid of a small image is finer: where a sun ends, the radiance goes from all to nothing within a pixel.
+const FINER: u32 = 2;
 
 /// What became of an environment map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,8 +37,7 @@ pub fn pack(bitmap: &Bitmap, scale: f64, values: &mut Vec<f32>) -> PackedSky {
     let first_value = values.len() as u32;
     values.reserve(3 * bitmap.pixels().len());
     values.extend(bitmap.pixels().iter().flatten().map(|value| (f64::from(*value) * scale) as f32));
-    let power_of_two = |size: u32, [least, most]: [u32; 2]| size.next_power_of_two().ilog2().clamp(least, most);
-    let (columns, rows) = (power_of_two(bitmap.width(), COLUMNS), power_of_two(bitmap.height(), ROWS));
+    let (columns, rows) = (grid_bits(bitmap.width(), COLUMNS), grid_bits(bitmap.height(), ROWS));
     let weights = cell_weights(bitmap, 1 << columns, 1 << rows);
     let first_weight = values.len() as u32;
     append_distribution(&weights, 1 << columns, values);
@@ -56,6 +55,12 @@ pub fn pack(bitmap: &Bitmap, scale: f64, values: &mut Vec<f32>) -> PackedSky {
     }
 }
 
+/// Columns or rows of the grid for so many of the image, as a power of two.
+fn grid_bits(size: u32, [least, finer, most]: [u32; 3]) -> u32 {
+    let own = size.next_power_of_two().ilog2();
+    (own + FINER).min(finer).max(own).clamp(least, most)
+}
+
 /// The largest value of a bitmap once it is multiplied by `scale`.
 pub fn largest(bitmap: &Bitmap, scale: f64) -> f64 {
     f64::from(bitmap.max()) * scale
@@ -63,8 +68,8 @@ pub fn largest(bitmap: &Bitmap, scale: f64) -> f64 {
 
 /// How many numbers [`pack`] appends at most.
 pub fn value_count(bitmap: &Bitmap) -> usize {
-    let cells = 1usize << (COLUMNS[1] + ROWS[1]);
-    3 * bitmap.pixels().len() + 2 * cells + (1 << ROWS[1])
+    let [columns, rows] = [COLUMNS[2], ROWS[2]].map(|bits| 1usize << bits);
+    3 * bitmap.pixels().len() + (2 * rows + 2) + rows * (2 * columns + 2)
 }
 
 /// A stretch of a row or column of the grid between two neighbouring pixels.
@@ -140,37 +145,32 @@ fn cell_weights(bitmap: &Bitmap, columns: usize, rows: usize) -> Vec<f64> {
     weights
 }
 
-/// Lines of an alias table with rounded thresholds, and the exact probability with which each is drawn.
-fn rounded_table(weights: &[f64]) -> (Vec<f32>, Vec<f64>) {
+/// Appends the distribution of the rows, and then those of the columns in each row.
+fn append_distribution(weights: &[f64], columns: usize, values: &mut Vec<f32>) {
+    let rows: Vec<f64> = weights.chunks_exact(columns).map(|row| row.iter().sum()).collect();
+    append_borders(&rows, values);
+    weights.chunks_exact(columns).for_each(|row| append_borders(row, values));
+}
+
+/// Appends the guides and the borders of the cells. The steps are divided into as many equal parts as there are cells; the guides name
+/// the cell in which each part begins, and at last the last cell.
+fn append_borders(weights: &[f64], values: &mut Vec<f32>) {
     let count = weights.len() as f64;
     let total: f64 = weights.iter().sum();
     let by_weight = |weight: f64| if total > 0.0 { weight / total } else { 1.0 / count };
-    let wanted: Vec<f64> =
-        weights.iter().map(|&weight| (1.0 - UNIFORM_SHARE) * by_weight(weight) + UNIFORM_SHARE / count).collect();
-    let mut probabilities = vec![0.0; weights.len()];
-    let mut entries = Vec::with_capacity(weights.len());
-    for (line, (threshold, alias)) in alias_table(&wanted).into_iter().enumerate() {
-        let steps = (threshold * THRESHOLDS).round();
-        // A line without an alias is its own: a threshold of 8192 would not fit in thirteen bits.
-        let (steps, alias) = if steps >= THRESHOLDS { (0.0, line) } else { (steps.max(0.0), alias as usize) };
-        probabilities[line] += steps / THRESHOLDS / count;
-        probabilities[alias] += (1.0 - steps / THRESHOLDS) / count;
-        entries.push((alias as f64 * THRESHOLDS + steps) as f32);
+    let mut sum = 0.0;
+    let mut borders = vec![0.0];
+    borders.extend(weights.iter().map(|&weight| {
+        sum += (1.0 - UNIFORM_SHARE) * by_weight(weight) + UNIFORM_SHARE / count;
+        (sum * STEPS).round()
+    }));
+    borders[weights.len()] = STEPS;
+    let mut cell = 0;
+    for part in 0..=weights.len() {
+        while cell + 1 < weights.len() && borders[cell + 1] <= part as f64 * STEPS / count {
+            cell += 1;
+        }
+        values.push(cell as f32);
     }
-    (entries, probabilities)
-}
-
-/// Appends the table of rows, the tables of columns, and the densities per solid angle.
-fn append_distribution(weights: &[f64], columns: usize, values: &mut Vec<f32>) {
-    let sums: Vec<f64> = weights.chunks_exact(columns).map(|row| row.iter().sum()).collect();
-    let (entries, row_probabilities) = rounded_table(&sums);
-    values.extend(entries);
-    let per_solid_angle = weights.len() as f64 / (4.0 * PI);
-    let mut densities = Vec::with_capacity(weights.len());
-    for (row, probability) in weights.chunks_exact(columns).zip(row_probabilities) {
-        let (entries, probabilities) = rounded_table(row);
-        values.extend(entries);
-        densities.extend(probabilities.iter().map(|column| (probability * column * per_solid_angle) as f32));
-    }
-    values.extend(densities);
+    values.extend(borders.iter().map(|&border| border as f32));
 }

@@ -14,11 +14,11 @@ use super::path_flight::{
     albedo_factor, end_flight, end_height_flight, end_mean_flight, end_voxel_flight, flight_point, flight_side,
     free_way, rare_collision_weight, rare_passage_weight,
 };
-use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, sample_light};
+use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, power_heuristic, sample_light};
 use super::path_open::{mean_passage, open_factor};
 pub use super::path_rays::{begin_hit, test_primitive};
 use super::path_shadow::{advance_shadow, cross_surface};
-use super::path_share::{share_aim, share_ended, share_light, share_vertex};
+use super::path_share::{share_aim, share_ended, share_light, share_vertex, sharer_number};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
     INFINITE_DISTANCE, begin_segment, medium_at, open_flight_of, sample_camera, sample_lens, sample_set,
@@ -67,8 +67,9 @@ pub fn path_start(tables: &Tables, pixel: u32, sample_index: u32) -> Path {
     if tables.features.sharers > 0 {
         let [dx, dy] = group_offset(tables.features.sharers, sample_index);
         let [columns, rows] = group_size(tables.features.sharers);
-        let group = [(column - params.crop_x + dx) / columns, (row - params.crop_y + dy) / rows];
-        path.group = group[1] * params.film_width + group[0];
+        let place = [column - params.crop_x + dx, row - params.crop_y + dy];
+        path.group = place[1] / rows * params.film_width + place[0] / columns;
+        path.member = sharer_number(place, tables.features.sharers);
     }
     let u = sample_camera(tables, &path);
     let corner = DVec2::new(f64::from(column), f64::from(row));
@@ -408,7 +409,7 @@ fn path_light(tables: &Tables, path: &mut Path, hit: &Hit) {
             survives = 1.0;
             transmittance *= f64::from(u8::from(f64::from(hit.medium) == light.edge_1.y));
         }
-        path.radiance += path.light_weight * transmittance / (1.0 + path.pdf_ratio * survives);
+        path.radiance += path.light_weight * transmittance * power_heuristic(path.pdf_ratio * survives);
         if path.sharing == 2 && path.depth == 2 {
             share_light(path);
         }

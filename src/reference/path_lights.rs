@@ -15,7 +15,7 @@ use super::path_state::{
     EMISSION_SETS, INFINITE_DISTANCE, Path, choose_light, sample_set, survival, survived_throughput,
 };
 use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
-use super::sky::{SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
+use super::sky::{SKY_STEPS, SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
 use super::texture::eval_texture;
 use crate::pack::layout::{
     LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_SPOT,
@@ -23,11 +23,21 @@ use crate::pack::layout::{
 };
 use glam::{DVec2, DVec3};
 
-/// Weight of a direction found by scattering that light sampling finds with density `light_pdf`: the balance heuristic
-/// (Veach and Guibas 1995).
+/// Weight of what one way to the light finds, if another finds it with `ratio` times its density: the power heuristic with the
+/// exponent 2 (Veach and Guibas 1995). Light sampling alone has little variance, so what scattering finds by chance must count for
+/// little beside it.
+pub fn power_heuristic(ratio: f64) -> f64 {
+    1.0 / (1.0 + ratio * ratio)
+}
+
+/// Weight of a direction found by scattering that light sampling finds with density `light_pdf`. Scattering finds the light only if the
+/// flight survives, so its probability to do so is part of the density.
 pub fn scattering_mis_weight(tables: &Tables, path: &Path, survival: f64, light_pdf: f64) -> f64 {
     let found = if tables.features.mis { path.pdf * survival } else { 0.0 };
-    if path.pdf == 0.0 || light_pdf == 0.0 { 1.0 } else { found / (found + light_pdf) }
+    if path.pdf == 0.0 || light_pdf == 0.0 {
+        return 1.0;
+    }
+    if found > light_pdf { power_heuristic(light_pdf / found) } else { 1.0 - power_heuristic(found / light_pdf) }
 }
 
 /// Whether light that arrives by chance counts.
@@ -192,7 +202,9 @@ pub fn sample_light(
         LIGHT_RECTANGLE => sample_rectangle_light(light, vertex.point, u),
         _ => match envmap(tables, light) {
             Some(sky) => {
-                let SkySample { direction, radiance, pdf } = sample_sky(&tables.values, sky, u, decision);
+                // With the digits that went into the choice of the light.
+                let lost = if tables.lights.len() > 1 { decision.x / (SKY_STEPS * light.probability) } else { 0.0 };
+                let SkySample { direction, radiance, pdf } = sample_sky(&tables.values, sky, u + DVec2::new(lost, 0.0));
                 let direction = from_envmap(light, direction);
                 LightSample { direction, distance: INFINITE_DISTANCE, weight: radiance / pdf, pdf }
             }

@@ -3,6 +3,7 @@
 
 use super::bindings::Tables;
 use super::bsdf::BsdfSample;
+use super::film::group_size;
 use super::math::{exp_minus, exp_minus_rgb, max_component};
 use super::medium::channel_weights;
 use super::path_aim::{Aim, Pivot, aim_at, aimed_pdf, is_common};
@@ -15,6 +16,12 @@ use super::phase::eval_henyey_greenstein;
 use crate::pack::layout::{BSDF_DIFFUSE, SURFACE_KIND_SHIFT};
 use glam::DVec3;
 use std::f64::consts::PI;
+
+/// The number of a pixel in its group; the place is within the shifted groups.
+pub fn sharer_number(place: [u32; 2], sharers: u32) -> u32 {
+    let [columns, rows] = group_size(sharers);
+    place[1] % rows * columns + place[0] % columns
+}
 
 /// Rays end this many times the offset of rays that leave a surface before it.
 const END_MARGIN: f64 = 4.0;

@@ -36,6 +36,8 @@ pub struct Path {
     pub sample_index: u32,
     /// Where pixels share paths, that of this sample.
     pub group: u32,
+    /// And the pixel's number in it.
+    pub member: u32,
     /// Factor of the radiance by the reconstruction filter; negative in its negative lobes.
     pub filter_weight: f64,
     /// Of the ray that is asked for.
@@ -195,7 +197,10 @@ pub fn vertex_numbers(tables: &Tables, path: &Path, segment: u32) -> DVec4 {
         return own;
     }
     let of_render = numbers_of_set(tables, tables.params.seed, path.pixel, 1, path.sample_index);
-    DVec4::new(of_render.x, of_render.y, own.z, own.w)
+    let seed = group_seed(tables.params.seed, path.sample_index);
+    let index = group_index(path.sample_index) * tables.features.sharers + path.member;
+    let of_group = numbers_of_set(tables, seed, path.group, 1, index);
+    DVec4::new(of_render.x, of_render.y, of_group.z, of_group.w)
 }
 
 /// The numbers for a camera's lens.

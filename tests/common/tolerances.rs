@@ -71,7 +71,7 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "sky direction", relative: 2e-6, absolute: 0.0 },
     Tolerance { function: "sky coordinates", relative: 0.0, absolute: 3e-7 },
     Tolerance { function: "sky radiance", relative: 2e-5, absolute: 0.0 },
-    Tolerance { function: "sky pdf", relative: 1e-7, absolute: 0.0 },
+    Tolerance { function: "sky pdf", relative: 4e-7, absolute: 0.0 },
     Tolerance { function: "alias rescaled", relative: 0.0, absolute: 1e-5 },
     Tolerance { function: "volume light direction", relative: 5e-7, absolute: 0.0 },
     Tolerance { function: "volume light distance", relative: 5e-6, absolute: 0.0 },
