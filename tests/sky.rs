@@ -267,6 +267,31 @@ fn the_sky_is_drawn_as_its_density_says() {
     }
 }
 
+/// Whether numbers in ascending order draw heights, or azimuths within a row, in one order: numbers that are well spread then stay so.
+fn check_order(places: impl Iterator<Item = f64>) -> Result<(), String> {
+    let places: Vec<f64> = places.collect();
+    match places.windows(2).find(|pair| pair[0] > pair[1]) {
+        Some(pair) => Err(format!("{} comes before {}", pair[0], pair[1])),
+        None => Ok(()),
+    }
+}
+
+#[test]
+fn the_sky_is_drawn_in_order() {
+    for (name, map) in maps() {
+        let place = |u: f64, v: f64| {
+            let direction = reference::sky::sample_sky(&map.values, &map.widened(), DVec2::new(u, v)).direction;
+            DVec2::new(Light::sky_uv(direction).x, 0.5 - 0.5 * direction.y)
+        };
+        let steps = || (0..4096).map(|k| f64::from(k) / 4096.0);
+        for other in [0.1, 0.37, 0.9] {
+            check_order(steps().map(|u| place(u, other).y)).unwrap_or_else(|why| panic!("{name}, heights: {why}"));
+            check_order(steps().map(|v| place(other, v).x)).unwrap_or_else(|why| panic!("{name}, azimuths: {why}"));
+            check_order(steps().map(|u| place(1.0 - u, other).y)).expect_err("the other way round");
+        }
+    }
+}
+
 /// Mean of the radiance's channels over all directions, by the midpoint rule in the azimuth and in the angle from +y, on the
 /// definition.
 fn mean_radiance(bitmap: &Bitmap, moment: impl Fn(DVec3) -> f64) -> f64 {
