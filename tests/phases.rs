@@ -309,7 +309,7 @@ fn a_medium_that_absorbs_nothing_is_invisible_in_a_furnace() {
         scene.shapes.push(Shape::boundary("inner", scenes::ball(v(0.2, 0.0, 0.1), 0.5), inner));
         scene.camera.fov_x = 8.0;
         scene.film = Film::new(16, 16);
-        let batches: Vec<f64> = images::batches(&scene, seed, 128).iter().map(|batch| batch.x).collect();
+        let batches: Vec<f64> = images::batches(&scene, seed, 192).iter().map(|batch| batch.x).collect();
         let (mean, error) = mean_and_error(&batches);
         let right = |mean: f64| error < 4e-3 && (mean - 1.0).abs() < 3.3 * error + 1e-5;
         assert!(right(mean), "{name}: {mean} ± {error}");
