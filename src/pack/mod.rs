@@ -513,6 +513,7 @@ fn pack_lights(
     // A light that is black has nothing to be found, and would be chosen in vain.
     let shining = || scene.lights.iter().enumerate().filter(|(_, light)| light.shines());
     let first_sky = lights.len();
+    let scattering = scene.media.iter().any(|medium| medium.sigma_t * medium.albedo != DVec3::ZERO);
     for (index, light) in shining() {
         match light {
             scene::Light::Constant { radiance } => lights.add_constant(*radiance, frame),
@@ -525,7 +526,7 @@ fn pack_lights(
                 if count > u32::MAX as usize {
                     return Err(PackError::TooManyValues(count));
                 }
-                let packed = sky::pack(bitmap, *scale, values);
+                let packed = sky::pack(bitmap, *scale, scattering, values);
                 lights.add_envmap(packed.mean, textures.len() as u32, to_world, frame);
                 textures.push(packed.texture);
             }

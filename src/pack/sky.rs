@@ -3,7 +3,8 @@
 //! The distribution is a grid of cells of equal solid angle, uniform in the azimuth and in the height y: a row is drawn by the sums of
 //! the rows' probabilities, then a column by those of that row. A cell's weight is the integral of the bilinear radiance over it, mean of
 //! the channels, by exact integration along the rows of the image and Gauss's rule across, so that no pixel falls between the cells,
-//! however fine the image. A share of each choice is uniform, which covers what the weights make too little of.
+//! however fine the image. Of that weight the distribution has what exceeds a multiple of the mean over all directions ("MIS
+//! compensation": Karlík, Šik, Vévoda, Skřivan and Křivánek 2019). What is left out, whole cells of it, is found by scattering alone.
 //!
 //! The sums are rounded to multiples of 2⁻²⁴, and densities are those of the rounded ones: exactly what is drawn.
 
@@ -11,12 +12,15 @@ use super::layout::{TEXTURE_SKY, Texture};
 use crate::scene::Bitmap;
 use std::f64::consts::PI;
 
-/// Share of the choice of a row, and of a column within it, that is uniform.
-const UNIFORM_SHARE: f64 = 1.0 / 16.0;
+/// What of the radiance is left to scattering, in units of its mean: half the mean, so that light sampling has at least half of all light.
+/// Surfaces scatter to what they face, and find more by it than media do, which scatter to all sides: without media it is the whole
+/// mean, if light sampling then keeps this share of the light. Maps that hardly differ from their mean would leave it too little.
+const LEFT_OUT: f64 = 0.5;
+const LEFT_OUT_BETWEEN_SURFACES: f64 = 1.0;
+const LEAST_SHARE: f64 = 0.25;
 /// Steps of the sums.
 const STEPS: f64 = 16_777_216.0;
-/// The coarsest grid, the finest that is finer than its image, and the finest of all: powers of two of columns and rows. Even with the
-/// uniform share alone a cell has hundreds of steps.
+/// The coarsest grid, the finest that is finer than its image, and the finest of all: powers of two of columns and rows.
 const COLUMNS: [u32; 3] = [4, 10, 11];
 const ROWS: [u32; 3] = [3, 9, 10];
 /// By so many powers of two the grid of a small image is finer: where a sun ends, the radiance goes from all to nothing within a pixel.
@@ -31,16 +35,17 @@ pub struct PackedSky {
     pub texture: Texture,
 }
 
-/// Appends the pixels of an environment map, multiplied by `scale`, and its distribution to the values. Whether single
-/// precision can hold the product, [`largest`] tells, and [`value_count`] whether there is room.
-pub fn pack(bitmap: &Bitmap, scale: f64, values: &mut Vec<f32>) -> PackedSky {
+/// Appends the pixels of an environment map, multiplied by `scale`, and its distribution to the values. `scattering` says
+/// whether media scatter its light. Whether single precision can hold the product, [`largest`] tells, and [`value_count`] whether
+/// there is room.
+pub fn pack(bitmap: &Bitmap, scale: f64, scattering: bool, values: &mut Vec<f32>) -> PackedSky {
     let first_value = values.len() as u32;
     values.reserve(3 * bitmap.pixels().len());
     values.extend(bitmap.pixels().iter().flatten().map(|value| (f64::from(*value) * scale) as f32));
     let (columns, rows) = (grid_bits(bitmap.width(), COLUMNS), grid_bits(bitmap.height(), ROWS));
     let weights = cell_weights(bitmap, 1 << columns, 1 << rows);
     let first_weight = values.len() as u32;
-    append_distribution(&weights, 1 << columns, values);
+    append_distribution(&compensated(&weights, scattering), 1 << columns, values);
     PackedSky {
         mean: weights.iter().sum::<f64>() * scale,
         texture: Texture {
@@ -145,6 +150,17 @@ fn cell_weights(bitmap: &Bitmap, columns: usize, rows: usize) -> Vec<f64> {
     weights
 }
 
+/// What light sampling has of the weights.
+fn compensated(weights: &[f64], scattering: bool) -> Vec<f64> {
+    let total: f64 = weights.iter().sum();
+    let above = |left_out: f64| -> Vec<f64> {
+        let least = left_out * total / weights.len() as f64;
+        weights.iter().map(|weight| (weight - least).max(0.0)).collect()
+    };
+    let found = above(LEFT_OUT_BETWEEN_SURFACES);
+    if scattering || found.iter().sum::<f64>() < LEAST_SHARE * total { above(LEFT_OUT) } else { found }
+}
+
 /// Appends the distribution of the rows, and then those of the columns in each row.
 fn append_distribution(weights: &[f64], columns: usize, values: &mut Vec<f32>) {
     let rows: Vec<f64> = weights.chunks_exact(columns).map(|row| row.iter().sum()).collect();
@@ -161,7 +177,7 @@ fn append_borders(weights: &[f64], values: &mut Vec<f32>) {
     let mut sum = 0.0;
     let mut borders = vec![0.0];
     borders.extend(weights.iter().map(|&weight| {
-        sum += (1.0 - UNIFORM_SHARE) * by_weight(weight) + UNIFORM_SHARE / count;
+        sum += by_weight(weight);
         (sum * STEPS).round()
     }));
     borders[weights.len()] = STEPS;
