@@ -169,7 +169,10 @@ fn rough_surfaces_draw_what_their_densities_say() {
             name if name.starts_with("rough plastic") => 0.35,
             _ => 0.5,
         };
-        assert!(albedo > least && albedo <= 1.0 + 4.0 * error, "{name}: it reflects and transmits {albedo} ± {error}");
+        assert!(
+            albedo > least && albedo <= 1.0 + 4.0 * error + 1e-6,
+            "{name}: it reflects and transmits {albedo} ± {error}"
+        );
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -82,8 +82,9 @@ fn unsafe_outside_gpu(sources: &[Source]) -> Vec<String> {
 /// What a file of `shaders/lib` may include beside the generated files and constants.
 const MAY_INCLUDE: &[(&str, &[&str])] = &[
     ("sampler", &["rng"]),
-    ("bsdf", &["math", "warp"]),
-    ("principled", &["bsdf", "math", "warp"]),
+    ("microfacet", &["math", "warp"]),
+    ("bsdf", &["math", "warp", "microfacet"]),
+    ("principled", &["bsdf", "math", "warp", "microfacet"]),
     ("light", &["math", "warp"]),
     ("sky", &["math"]),
     ("medium", &["math"]),

@@ -115,7 +115,9 @@ fn rough_plastic_is_that_of_mitsuba() {
             eval_bsdf(&bindings::Surface::from(&surface), &values, towards(ci, 0.0), towards(co, phi)).value
         };
         let expected = DVec3::from_array(expected);
-        let agrees = |found: DVec3| (found - expected).abs().cmple(expected * 2e-3).all();
+        // Mitsuba has Walter et al.'s (2007) approximation of Beckmann's masking, which is up to 0.35 % off for either direction.
+        let tolerance = if distribution == Distribution::Beckmann { 7e-3 } else { 2e-3 };
+        let agrees = |found: DVec3| (found - expected).abs().cmple(expected * tolerance).all();
         assert!(agrees(found(alpha)), "{distribution:?} {alpha} {eta} {ci} {co}: {}, {expected}", found(alpha));
         assert!(!agrees(found(alpha * 1.5)), "the comparison is blind to the roughness");
     }

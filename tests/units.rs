@@ -105,15 +105,16 @@ fn elementary_functions() {
         };
         inputs.extend([vec4(&[u, x, y, x_of_angle]), vec4(&[n.x, n.y, n.z, z])]);
     }
-    let outputs: Vec<[f32; 4]> = run("math", &inputs, &[], inputs.len() / 2, inputs.len() / 2 * 3);
+    let outputs: Vec<[f32; 4]> = run("math", &inputs, &[], inputs.len() / 2, inputs.len() / 2 * 4);
     let mut log = comparison("minus_log_1m");
     let mut exp = comparison("exp_minus");
     let mut frame = comparison("orthonormal_frame");
     let mut angle = comparison("arctan2");
     let mut sine = comparison("sine");
     let mut ended = comparison("one_minus_exp_minus");
+    let mut erfc = comparison("scaled_erfc");
     let mut small_log = comparison("minus_log_1m_small");
-    for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(4)) {
         let [u, x] = [input[0][0], input[0][1]].map(f64::from);
         log.scalar(u, output[0][0], math::minus_log_1m(u));
         // What lies below the smallest normal number is 0.
@@ -124,6 +125,7 @@ fn elementary_functions() {
         sine.scalar(clamped, output[2][3], math::sine(f64::from(clamped)));
         let z = f64::from(input[1][3]);
         ended.scalar(z, output[0][3], math::one_minus_exp_minus(z));
+        erfc.scalar(z, output[3][0], math::scaled_erfc(z.min(5.0)));
         if z < 1.0 {
             small_log.scalar(z, output[1][3], math::minus_log_1m(z));
         }
@@ -139,6 +141,7 @@ fn elementary_functions() {
     sine.finish();
     ended.finish();
     small_log.finish();
+    erfc.finish();
     frame.finish();
 }
 

@@ -5,15 +5,17 @@ mod common;
 use common::comparison::Comparison;
 use common::random::Random;
 use common::scenes::v;
-use common::surfaces::{Query, ask, brushed, glass, metal, plastic, principled, rough_plastic, single, values};
+use common::surfaces::{
+    Query, ask, ask_facets, brushed, glass, metal, plastic, principled, rough_plastic, single, values,
+};
 use common::tolerances::comparison;
 use common::units::widen;
 use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
 use tyndall::pack::layout::{SURFACE_GGX, SURFACE_NONLINEAR, SURFACE_THIN, Surface};
 use tyndall::reference::bindings;
-use tyndall::reference::bsdf::{
-    BsdfValue, facet_density, facet_masking, facet_pdf, fresnel_conductor, fresnel_dielectric, roughness, sample_facet,
-};
+use tyndall::reference::bsdf::{BsdfValue, fresnel_conductor, fresnel_dielectric, roughness};
+use tyndall::reference::microfacet::{facet_density, facet_masking, facet_pdf, sample_facet};
 use tyndall::reference::path_vertex::{eval_surface, sample_surface};
 
 /// The largest of the program's random numbers.
@@ -171,22 +173,12 @@ fn queries(surfaces: &[Surface]) -> Vec<Query> {
 }
 
 #[test]
-fn facets_and_fresnel() {
+fn fresnel() {
     let surfaces = surfaces();
     let queries = queries(&surfaces);
-    let names = [
-        "fresnel_dielectric",
-        "cosine of refraction",
-        "fresnel_conductor",
-        "sample_facet",
-        "facet_density",
-        "facet_masking",
-        "facet_pdf",
-    ];
-    let mut functions = Functions::new(&names);
+    let mut functions = Functions::new(&["fresnel_dielectric", "cosine of refraction", "fresnel_conductor"]);
     for (query, answer) in queries.iter().zip(ask(&surfaces, &queries)) {
         let surface = bindings::Surface::from(&surfaces[query.surface]);
-        let (ggx, alpha) = (surface.flags & SURFACE_GGX != 0, roughness(&surface));
         let case = format!("{query:?}");
         if surface.eta > 0.0 {
             let (f, cos_t) = fresnel_dielectric(query.wi.z, surface.eta);
@@ -201,33 +193,80 @@ fn facets_and_fresnel() {
             let expected = fresnel_conductor(query.wi.z.abs(), surface.transmittance, surface.extinction);
             functions.of("fresnel_conductor").vector(&case, &answer.conductor, expected);
         }
-        if alpha.x > 0.0 {
-            let u = DVec2::from_array(query.u);
-            let expected = sample_facet(query.wi, u, alpha, ggx);
-            // Half way between two nearly opposite directions, the rounding of either counts.
-            let moved: Vec<DVec3> = nudged(query.wi)
-                .map(|wi| sample_facet(wi, u, alpha, ggx))
-                .chain([-2.4e-7, 2.4e-7].map(|step| sample_facet(query.wi, DVec2::new(u.x, u.y + step), alpha, ggx)))
-                .chain(
-                    [-1.2e-7, 1.2e-7].map(|step| {
-                        sample_facet(query.wi, DVec2::new((u.x * (1.0 + step)).min(LAST), u.y), alpha, ggx)
-                    }),
-                )
-                .collect();
-            functions.near_vector("sample_facet", &case, answer.facet, expected, &moved);
-            // Of the facet that the kernel found: rounding it is not an error of the function.
-            let m = widen(&answer.facet);
-            functions.of("facet_density").scalar(&case, answer.density, facet_density(m, alpha, ggx));
-            let moved: Vec<f64> = nudged(query.wi).map(|wi| facet_pdf(wi, m, alpha, ggx)).collect();
-            let want = facet_pdf(query.wi, m, alpha, ggx);
-            functions.near("facet_pdf", &case, answer.facet_pdf, want, &moved);
-            for (w, found) in [query.wi, query.wo].into_iter().zip(answer.masking) {
-                let moved: Vec<f64> = nudged(w).map(|w| facet_masking(w, m, alpha, ggx)).collect();
-                functions.near("facet_masking", &case, found, facet_masking(w, m, alpha, ggx), &moved);
-            }
+    }
+    functions.finish();
+}
+
+/// Numbers that differ by roundings.
+fn nudged_numbers(u: DVec2) -> [DVec2; 4] {
+    let moved = [DVec2::Y * 2.4e-7, DVec2::Y * -2.4e-7, DVec2::X * 1.2e-7, DVec2::X * -1.2e-7];
+    moved.map(|step| (u + step).clamp(DVec2::ZERO, DVec2::splat(LAST)))
+}
+
+#[test]
+fn facets() {
+    let mut functions = Functions::new(&["sample_facet", "facet_density", "facet_masking", "facet_pdf"]);
+    let surfaces: Vec<Surface> = surfaces().into_iter().filter(|surface| surface.alpha > 0.0).collect();
+    let queries = queries(&surfaces);
+    for (query, answer) in queries.iter().zip(ask_facets(&surfaces, &queries)) {
+        let surface = bindings::Surface::from(&surfaces[query.surface]);
+        let (ggx, alpha) = (surface.flags & SURFACE_GGX != 0, roughness(&surface));
+        let (case, u) = (format!("{query:?}, {alpha}, GGX: {ggx}"), DVec2::from_array(query.u));
+        let expected = sample_facet(query.wi, u, alpha, ggx);
+        // Half way between two nearly opposite directions, the rounding of either counts.
+        let stretched = |w: DVec3, alpha: DVec2| (w.truncate() * alpha).extend(w.z).normalize();
+        let half = stretched(expected, 1.0 / alpha).dot(stretched(query.wi, alpha)).abs();
+        let rounded = if ggx { DVec3::splat(1.2e-7 / half) } else { DVec3::ZERO };
+        let moved: Vec<DVec3> = nudged(query.wi)
+            .map(|wi| sample_facet(wi, u, alpha, ggx))
+            .chain(nudged_numbers(u).map(|u| sample_facet(query.wi, u, alpha, ggx)))
+            .chain([expected + rounded])
+            .collect();
+        functions.near_vector("sample_facet", &case, answer.normal, expected, &moved);
+        // Of the facet that the kernel found: rounding it is not an error of the function.
+        let m = widen(&answer.normal);
+        functions.of("facet_density").scalar(&case, answer.density, facet_density(m, alpha, ggx));
+        let moved: Vec<f64> = nudged(query.wi).map(|wi| facet_pdf(wi, m, alpha, ggx)).collect();
+        functions.near("facet_pdf", &case, answer.pdf, facet_pdf(query.wi, m, alpha, ggx), &moved);
+        for (w, found) in [query.wi, query.wo].into_iter().zip(answer.masking) {
+            let moved: Vec<f64> = nudged(w).map(|w| facet_masking(w, m, alpha, ggx)).collect();
+            functions.near("facet_masking", &case, found, facet_masking(w, m, alpha, ggx), &moved);
         }
     }
     functions.finish();
+}
+
+/// Of Beckmann's facets, by Simpson's rule over their slopes: what a direction sees of them, over the area that they cover.
+fn covered_over_seen(cosine: f64, alpha: f64) -> f64 {
+    const STEPS: i32 = 40_000;
+    let tangent = alpha * (1.0 - cosine * cosine).sqrt() / cosine;
+    let least = (-1.0 / tangent).max(-9.0);
+    let width = (9.0 - least) / f64::from(STEPS);
+    let seen: f64 = (0..=STEPS)
+        .map(|step| {
+            let (s, weight) = (least + width * f64::from(step), if step % 2 == 1 { 4.0 } else { 2.0 });
+            let weight = if step == 0 || step == STEPS { 1.0 } else { weight };
+            weight * (-s * s).exp() * (1.0 + tangent * s)
+        })
+        .sum();
+    PI.sqrt() / (seen * width / 3.0)
+}
+
+#[test]
+fn masking_is_smiths() {
+    for alpha in [0.05, 0.3, 1.0] {
+        for cosine in [0.999, 0.8, 0.5, 0.2, 0.05, 1e-3f64] {
+            let v = v(-(1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+            let expected = covered_over_seen(cosine, alpha);
+            let agrees = |found: f64| (found - expected).abs() < 1e-9 * expected;
+            let found = facet_masking(v, DVec3::Z, DVec2::splat(alpha), false);
+            assert!(agrees(found), "alpha {alpha}, cosine {cosine}: {found}, expected {expected}");
+            // The rational approximation of Walter et al. (2007).
+            let a = cosine / (alpha * (1.0 - cosine * cosine).sqrt());
+            let near = (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a);
+            assert!(a >= 1.6 || !agrees(near), "the comparison is blind to {near}");
+        }
+    }
 }
 
 #[test]
@@ -259,14 +298,9 @@ fn surfaces_scatter_as_the_reference() {
         functions.near("eval_bsdf pdf", &case, answer.value_pdf, asked.pdf, &pdfs);
 
         let found = sample_surface(&surface, &table, wi, u, lobe);
-        let turned = [-2.4e-7, 2.4e-7].map(|step| DVec2::new(u.x, u.y + step));
         let moved: Vec<_> = nudged(wi)
             .map(|wi| sample_surface(&surface, &table, wi, u, lobe))
-            .chain(turned.map(|u| sample_surface(&surface, &table, wi, u, lobe)))
-            .chain([-1.2e-7, 1.2e-7].map(|step| {
-                let u = DVec2::new((u.x * (1.0 + step)).min(LAST), u.y);
-                sample_surface(&surface, &table, wi, u, lobe)
-            }))
+            .chain(nudged_numbers(u).map(|u| sample_surface(&surface, &table, wi, u, lobe)))
             .chain([-4e-6, 4e-6].map(|step| {
                 // The tangent of the facet, whose error sample_facet declares.
                 let other = bindings::Surface {

@@ -5,6 +5,7 @@
 #include "lib/constants.glsl"
 #include "lib/math.glsl"
 #include "lib/warp.glsl"
+#include "lib/microfacet.glsl"
 
 struct BsdfValue {
     vec3 value;     // BSDF times |cos wo|, [1/sr]
@@ -58,66 +59,6 @@ vec3 fresnel_conductor(float cos_i, vec3 eta, vec3 k) {
     return 0.5 * (s + p);
 }
 
-// Density of microfacet normals, [1/sr], for normals with z > 0. Beckmann (1963) or GGX (Walter et al. 2007), in their
-// anisotropic forms (Heitz 2014, equations 79 and 85).
-float facet_density(vec3 m, vec2 alpha, bool ggx) {
-    if (m.z <= 0.0) {
-        return 0.0;
-    }
-    vec2 stretched = m.xy / alpha;
-    float c2 = m.z * m.z, s2 = dot(stretched, stretched);
-    if (ggx) {
-        float d = c2 + s2;
-        return 1.0 / (PI * alpha.x * alpha.y * d * d);
-    }
-    // Where c2 is too small for single precision, the exponential is 0.
-    float shape = exp_minus(s2 / c2);
-    return shape > 0.0 ? shape / (PI * alpha.x * alpha.y * c2 * c2) : 0.0;
-}
-
-// Smith's masking of direction v for facets with normal m.
-float facet_masking(vec3 v, vec3 m, vec2 alpha, bool ggx) {
-    if (dot(v, m) * v.z <= 0.0) {
-        return 0.0;
-    }
-    vec2 stretched = v.xy * alpha;
-    float tan2 = dot(stretched, stretched) / (v.z * v.z);
-    if (tan2 == 0.0) {
-        return 1.0;
-    }
-    if (ggx) {
-        return 2.0 / (1.0 + sqrt(1.0 + tan2));
-    }
-    // Walter et al.'s (2007) rational approximation, relative error below 0.35 %.
-    float a = 1.0 / sqrt(tan2);
-    return a >= 1.6 ? 1.0 : (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a);
-}
-
-// A facet normal with density facet_pdf. Of GGX the facets that w sees are sampled, on the sphere to which the roughness stretches
-// them (Dupuy and Benyoub 2023); of Beckmann all facets, in proportion to their projected area.
-vec3 sample_facet(vec3 w, vec2 u, vec2 alpha, bool ggx) {
-    if (!ggx) {
-        float phi = 2.0 * PI * u.y;
-        vec2 slope = sqrt(minus_log_1m(u.x)) * alpha * vec2(cos(phi), sin(phi));
-        float c = inversesqrt(1.0 + dot(slope, slope));
-        return vec3(slope * c, c);
-    }
-    vec3 v = normalize(vec3(alpha * w.xy, w.z));
-    v = w.z < 0.0 ? -v : v;
-    // A point of the cap z > -v.z of the unit sphere, uniformly; 1 - z is `down` and 1 + z is `up`, neither with cancellation. The
-    // normal is half way to v.
-    float height = 1.0 + v.z;
-    float down = u.x * height, up = (1.0 - u.x) * height + dot(v.xy, v.xy) / height;
-    vec3 cap = from_polar(1.0 - down, sqrt(down * up), u.y);
-    return normalize(vec3(alpha * (cap.xy + v.xy), height * (1.0 - u.x)));
-}
-
-// Density of sample_facet, [1/sr]: of the facets that w sees D G1(w) |w.m| / |w.z| (Heitz 2014, equation 15), else D m.z.
-float facet_pdf(vec3 w, vec3 m, vec2 alpha, bool ggx) {
-    float density = facet_density(m, alpha, ggx);
-    return ggx ? density * facet_masking(w, m, alpha, ggx) * abs(dot(w, m) / w.z) : density * m.z;
-}
-
 uint bsdf_kind(Surface surface) {
     return surface.flags >> SURFACE_KIND_SHIFT;
 }
@@ -127,7 +68,7 @@ vec2 roughness(Surface surface) {
 }
 
 bool is_ggx(Surface surface) {
-    return (surface.flags & SURFACE_GGX) != 0u;
+    return !HAS_BECKMANN || (surface.flags & SURFACE_GGX) != 0u;
 }
 
 vec3 reflect_z(vec3 w) {

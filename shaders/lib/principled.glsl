@@ -11,6 +11,7 @@
 #include "lib/constants.glsl"
 #include "lib/math.glsl"
 #include "lib/warp.glsl"
+#include "lib/microfacet.glsl"
 #include "lib/bsdf.glsl"
 
 // A smoother surface is taken to be as rough as this.

@@ -1,6 +1,5 @@
 // Unit kernel of lib/bsdf.glsl: (wi, which surface), (wo, lobe), (u, 0, 0) in; (sampled direction, density), (weight, index),
-// (value for wo, density), (Fresnel's reflectance at wi, cosine of refraction, masking of wi, of wo), (facet's normal, its
-// density) and (a conductor's reflectance at wi, density of sampling the facet) out. The masking is that of the facet which u samples.
+// (value for wo, density), (Fresnel's reflectance at wi, cosine of refraction) and (a conductor's reflectance at wi) out.
 #version 460
 #include "lib/layout.glsl"
 #include "lib/features.glsl"
@@ -24,13 +23,9 @@ void main() {
     BsdfValue asked = eval_bsdf(surface, wi, wo);
     float cos_t;
     float fresnel = fresnel_dielectric(wi.z, surface.eta, cos_t);
-    bool ggx = (surface.flags & SURFACE_GGX) != 0u;
-    vec2 alpha = roughness(surface);
-    vec3 m = sample_facet(wi, u, alpha, ggx);
-    outputs[6u * i] = vec4(found.direction, found.pdf);
-    outputs[6u * i + 1u] = vec4(found.weight, found.eta);
-    outputs[6u * i + 2u] = vec4(asked.value, asked.pdf);
-    outputs[6u * i + 3u] = vec4(fresnel, cos_t, facet_masking(wi, m, alpha, ggx), facet_masking(wo, m, alpha, ggx));
-    outputs[6u * i + 4u] = vec4(m, facet_density(m, alpha, ggx));
-    outputs[6u * i + 5u] = vec4(fresnel_conductor(abs(wi.z), surface.transmittance, surface.extinction), facet_pdf(wi, m, alpha, ggx));
+    outputs[5u * i] = vec4(found.direction, found.pdf);
+    outputs[5u * i + 1u] = vec4(found.weight, found.eta);
+    outputs[5u * i + 2u] = vec4(asked.value, asked.pdf);
+    outputs[5u * i + 3u] = vec4(fresnel, cos_t, 0.0, 0.0);
+    outputs[5u * i + 4u] = vec4(fresnel_conductor(abs(wi.z), surface.transmittance, surface.extinction), 0.0);
 }

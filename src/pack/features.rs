@@ -61,6 +61,8 @@ pub struct Features {
     pub plastic: bool,
     /// A diffuse body under a rough varnish.
     pub rough_plastic: bool,
+    /// Microfacets of Beckmann's distribution.
+    pub beckmann: bool,
     /// The principled BSDF.
     pub principled: bool,
     /// Colours or an opacity that depend on the place.
@@ -167,6 +169,12 @@ impl Features {
             conductor: bsdf(BSDF_CONDUCTOR),
             plastic: bsdf(BSDF_PLASTIC),
             rough_plastic: packed.surfaces.iter().any(|surface| surface.value_count != 0),
+            beckmann: packed.surfaces.iter().any(|surface| {
+                let facets = [BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_PLASTIC];
+                facets.contains(&(surface.flags >> SURFACE_KIND_SHIFT))
+                    && surface.alpha > 0.0
+                    && surface.flags & SURFACE_GGX == 0
+            }),
             principled: bsdf(BSDF_PRINCIPLED),
             textures: packed.surfaces.iter().any(|surface| {
                 surface.textures_1 | surface.textures_2 | surface.share_texture | surface.relief_texture != 0
@@ -241,6 +249,7 @@ impl Features {
             conductor: true,
             plastic: true,
             rough_plastic: true,
+            beckmann: true,
             // So much code that drivers take many times as long for it.
             principled: self.principled,
             textures: true,
@@ -299,6 +308,7 @@ impl Features {
             ("HAS_PLASTIC", self.plastic),
             ("HAS_LOBES", self.lobes()),
             ("HAS_ROUGH_PLASTIC", self.rough_plastic),
+            ("HAS_BECKMANN", self.beckmann),
             ("HAS_PRINCIPLED", self.principled),
             ("HAS_TEXTURES", self.textures),
             ("HAS_ANISOTROPIC", self.anisotropic),

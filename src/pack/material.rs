@@ -309,7 +309,7 @@ impl VisibleFacets {
             return 2.0 / (1.0 + (1.0 + tan2).sqrt());
         }
         let a = 1.0 / tan2.sqrt();
-        if a >= 1.6 { 1.0 } else { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) }
+        2.0 / (1.0 + libm::erf(a) + (-a * a).exp() / (a * PI.sqrt()))
     }
 
     /// What a facet reflects back to the side of w and no other facet shadows.

@@ -325,6 +325,7 @@ const EMPTY_FEATURES: Features = Features {
     conductor: false,
     plastic: false,
     rough_plastic: false,
+    beckmann: false,
     principled: false,
     textures: false,
     anisotropic: false,

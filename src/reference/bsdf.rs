@@ -2,14 +2,14 @@
 //! stand there.
 
 use super::bindings::Surface;
-use super::math::{exp_minus, minus_log_1m};
-use super::warp::{from_polar, square_to_cosine_hemisphere};
+use super::microfacet::{facet_density, facet_masking, facet_pdf, sample_facet};
+use super::warp::square_to_cosine_hemisphere;
 use crate::pack::layout::{
     BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, BSDF_PLASTIC, SURFACE_GGX, SURFACE_KIND_SHIFT, SURFACE_NONLINEAR,
     SURFACE_PANE, SURFACE_THIN,
 };
 use glam::{DVec2, DVec3};
-use std::f64::consts::{FRAC_1_PI, PI};
+use std::f64::consts::FRAC_1_PI;
 
 /// A BSDF for a pair of directions.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,59 +66,6 @@ pub fn fresnel_conductor(cos_i: f64, eta: DVec3, k: DVec3) -> DVec3 {
     let (t3, t4) = (a2b2 * c2 + DVec3::splat(s2 * s2), t2 * s2);
     let p = s * (t3 - t4) / (t3 + t4);
     0.5 * (s + p)
-}
-
-/// Density of microfacet normals with z > 0, 1/sr; `alpha` is the roughness along tangent and bitangent. Beckmann (1963) or GGX
-/// (Walter et al. 2007), in their anisotropic forms (Heitz 2014, equations 79 and 85).
-pub fn facet_density(m: DVec3, alpha: DVec2, ggx: bool) -> f64 {
-    if m.z <= 0.0 {
-        return 0.0;
-    }
-    let (c2, s2) = (m.z * m.z, (m.truncate() / alpha).length_squared());
-    if ggx {
-        let d = c2 + s2;
-        return 1.0 / (PI * alpha.x * alpha.y * d * d);
-    }
-    let shape = exp_minus(s2 / c2);
-    if shape > 0.0 { shape / (PI * alpha.x * alpha.y * c2 * c2) } else { 0.0 }
-}
-
-/// Smith's masking of direction v for facets with normal m.
-pub fn facet_masking(v: DVec3, m: DVec3, alpha: DVec2, ggx: bool) -> f64 {
-    if v.dot(m) * v.z <= 0.0 {
-        return 0.0;
-    }
-    let tan2 = (v.truncate() * alpha).length_squared() / (v.z * v.z);
-    if tan2 == 0.0 {
-        return 1.0;
-    }
-    if ggx {
-        return 2.0 / (1.0 + (1.0 + tan2).sqrt());
-    }
-    let a = 1.0 / tan2.sqrt();
-    if a >= 1.6 { 1.0 } else { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) }
-}
-
-/// A facet normal with density [`facet_pdf`]: of GGX those that w sees (Dupuy and Benyoub 2023), of Beckmann all.
-pub fn sample_facet(w: DVec3, u: DVec2, alpha: DVec2, ggx: bool) -> DVec3 {
-    if !ggx {
-        let (sin_phi, cos_phi) = (2.0 * PI * u.y).sin_cos();
-        let slope = minus_log_1m(u.x).sqrt() * alpha * DVec2::new(cos_phi, sin_phi);
-        let c = 1.0 / (1.0 + slope.length_squared()).sqrt();
-        return (slope * c).extend(c);
-    }
-    let v = (alpha * w.truncate()).extend(w.z).normalize();
-    let v = if w.z < 0.0 { -v } else { v };
-    let height = 1.0 + v.z;
-    let (down, up) = (u.x * height, (1.0 - u.x) * height + v.truncate().length_squared() / height);
-    let cap = from_polar(1.0 - down, (down * up).sqrt(), u.y);
-    (alpha * (cap + v).truncate()).extend(height * (1.0 - u.x)).normalize()
-}
-
-/// Density of [`sample_facet`], 1/sr (Heitz 2014, equation 15).
-pub fn facet_pdf(w: DVec3, m: DVec3, alpha: DVec2, ggx: bool) -> f64 {
-    let density = facet_density(m, alpha, ggx);
-    if ggx { density * facet_masking(w, m, alpha, ggx) * (w.dot(m) / w.z).abs() } else { density * m.z }
 }
 
 /// One of the `BSDF_` constants.

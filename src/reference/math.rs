@@ -2,6 +2,11 @@
 
 use glam::DVec3;
 
+/// −log(x) for x in (0, 1\].
+pub fn minus_log(x: f64) -> f64 {
+    -x.ln()
+}
+
 /// −log(1 − u) for u in \[0, 1): the optical depth of a free flight.
 pub fn minus_log_1m(u: f64) -> f64 {
     -(-u).ln_1p()
@@ -25,6 +30,11 @@ pub fn one_minus_exp_minus_rgb(x: DVec3) -> DVec3 {
 /// [`exp_minus`] of each component.
 pub fn exp_minus_rgb(x: DVec3) -> DVec3 {
     DVec3::new(exp_minus(x.x), exp_minus(x.y), exp_minus(x.z))
+}
+
+/// exp(x²) erfc(x) for x in \[0, 5\].
+pub fn scaled_erfc(x: f64) -> f64 {
+    (x * x).exp() * libm::erfc(x)
 }
 
 /// The angle of the point (x, y) from the x axis, in \[−π, π\]; 0 at the origin.

@@ -15,6 +15,7 @@ pub mod grid;
 pub mod light;
 pub mod math;
 pub mod medium;
+pub mod microfacet;
 pub mod outlook;
 pub mod path;
 pub mod path_aim;

@@ -2,11 +2,9 @@
 //! stands there.
 
 use super::bindings::Surface;
-use super::bsdf::{
-    BsdfSample, BsdfValue, NO_SAMPLE, facet_density, facet_masking, facet_pdf, fresnel_dielectric, refract_at,
-    roughness, sample_facet, weighted_sample,
-};
+use super::bsdf::{BsdfSample, BsdfValue, NO_SAMPLE, fresnel_dielectric, refract_at, roughness, weighted_sample};
 use super::math::{exp_minus, one_minus_exp_minus};
+use super::microfacet::{facet_density, facet_masking, facet_pdf, sample_facet};
 use super::warp::{from_polar, square_to_cosine_hemisphere};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, PI};

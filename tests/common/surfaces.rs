@@ -126,13 +126,7 @@ pub struct Answer {
     pub value_pdf: f32,
     pub fresnel: f32,
     pub cos_t: f32,
-    /// Of wi and wo.
-    pub masking: [f32; 2],
-    pub facet: [f32; 3],
-    pub density: f32,
     pub conductor: [f32; 3],
-    /// Density with which the facet is sampled.
-    pub facet_pdf: f32,
 }
 
 impl Answer {
@@ -163,7 +157,7 @@ pub fn ask(surfaces: &[Surface], queries: &[Query]) -> Vec<Answer> {
         .collect();
     let table = bytemuck::cast_slice(surfaces);
     let outputs: Vec<[f32; 4]> =
-        run("bsdf", &inputs, &[table, bytemuck::cast_slice(&values())], queries.len(), 6 * queries.len());
+        run("bsdf", &inputs, &[table, bytemuck::cast_slice(&values())], queries.len(), 5 * queries.len());
     // Principled surfaces have a kernel of their own.
     let mut outputs = outputs;
     let kind = |query: &Query| surfaces[query.surface].flags >> SURFACE_KIND_SHIFT;
@@ -171,7 +165,7 @@ pub fn ask(surfaces: &[Surface], queries: &[Query]) -> Vec<Answer> {
         let found: Vec<[f32; 4]> =
             run("principled", &inputs, &[table, bytemuck::cast_slice(&values())], queries.len(), 3 * queries.len());
         for (k, _) in queries.iter().enumerate().filter(|(_, query)| kind(query) == BSDF_PRINCIPLED) {
-            outputs[6 * k..6 * k + 3].copy_from_slice(&found[3 * k..3 * k + 3]);
+            outputs[5 * k..5 * k + 3].copy_from_slice(&found[3 * k..3 * k + 3]);
         }
     }
     let three = |vector: [f32; 4]| [vector[0], vector[1], vector[2]];
@@ -184,11 +178,37 @@ pub fn ask(surfaces: &[Surface], queries: &[Query]) -> Vec<Answer> {
         value_pdf: output[2][3],
         fresnel: output[3][0],
         cos_t: output[3][1],
-        masking: [output[3][2], output[3][3]],
-        facet: three(output[4]),
-        density: output[4][3],
-        conductor: three(output[5]),
-        facet_pdf: output[5][3],
+        conductor: three(output[4]),
     };
-    outputs.chunks(6).map(answer).collect()
+    outputs.chunks(5).map(answer).collect()
+}
+
+/// A facet that a query's numbers sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Facet {
+    pub normal: [f32; 3],
+    pub density: f32,
+    /// Of wi and wo.
+    pub masking: [f32; 2],
+    /// Density with which it is sampled.
+    pub pdf: f32,
+}
+
+/// Runs the unit kernel of facets.
+pub fn ask_facets(surfaces: &[Surface], queries: &[Query]) -> Vec<Facet> {
+    let input = |query: &Query| {
+        let Query { surface, wi, wo, u, .. } = query;
+        let Surface { flags, alpha, alpha_v, .. } = surfaces[*surface];
+        let ggx = f64::from(flags & SURFACE_GGX);
+        [vec4(&[wi.x, wi.y, wi.z, alpha.into()]), vec4(&[wo.x, wo.y, wo.z, alpha_v.into()]), vec4(&[u[0], u[1], ggx])]
+    };
+    let inputs: Vec<[f32; 4]> = queries.iter().flat_map(input).collect();
+    let outputs: Vec<[f32; 4]> = run("microfacet", &inputs, &[], queries.len(), 2 * queries.len());
+    let facet = |output: &[[f32; 4]]| Facet {
+        normal: [output[0][0], output[0][1], output[0][2]],
+        density: output[0][3],
+        masking: [output[1][0], output[1][1]],
+        pdf: output[1][2],
+    };
+    outputs.chunks(2).map(facet).collect()
 }

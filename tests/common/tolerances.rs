@@ -8,6 +8,7 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "minus_log_1m", relative: 3e-7, absolute: 0.0 },
     Tolerance { function: "exp_minus", relative: 3e-7, absolute: 2e-38 },
     Tolerance { function: "sine", relative: 2e-7, absolute: 1e-37 },
+    Tolerance { function: "scaled_erfc", relative: 5e-7, absolute: 0.0 },
     Tolerance { function: "arctan2", relative: 3e-7, absolute: 1e-37 },
     Tolerance { function: "one_minus_exp_minus", relative: 4e-7, absolute: 0.0 },
     Tolerance { function: "minus_log_1m_small", relative: 1.5e-6, absolute: 0.0 },
