@@ -243,10 +243,10 @@ fn free_flights_are_exponential() {
     let mut random = Random(41);
     let numbers: Vec<f64> = (0..100_000).map(|_| random.unit()).collect();
     let inputs: Vec<[f32; 4]> = numbers.iter().flat_map(|&u| [vec4(&[u, 1.0]), vec4(&[0.0, 0.0, 1.0])]).collect();
-    let depths: Vec<[f32; 4]> = run("math", &inputs, &[], numbers.len(), 3 * numbers.len());
+    let depths: Vec<[f32; 4]> = run("math", &inputs, &[], numbers.len(), 4 * numbers.len());
     for sigma in [1e-12, 1e-3, 1.0, 37.0, 1e8].map(single) {
         let inputs: Vec<[f32; 4]> = depths
-            .chunks(3)
+            .chunks(4)
             .flat_map(|depth| [[0.5, depth[0][0], sigma as f32, 0.0], [1.0; 4], [1.0; 4], [1.0; 4], [1.0; 4]])
             .collect();
         let outputs: Vec<[f32; 4]> = run("medium", &inputs, &[], numbers.len(), 5 * numbers.len());

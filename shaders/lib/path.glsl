@@ -50,9 +50,9 @@ void path_start(inout Path path, uvec2 pixel) {
     uint row = pixel.y + params.crop_y, column = pixel.x + params.crop_x;
     path.pixel = row * params.film_width + column;
     if (HAS_SHARING) {
-        uvec2 group = (pixel + group_offset(SHARERS, path.sample_index)) / SHARE_SIZE;
+        uvec2 place = pixel + group_offset(SHARERS, path.sample_index), group = place / SHARE_SIZE;
         path.group = group.y * params.film_width + group.x;
-        path.member = sharer_number(pixel + group_offset(SHARERS, path.sample_index));
+        path.member = sharer_number(place);
     }
     vec4 u = sample_camera(path);
     vec2 place = vec2(column, row) + u.xy;

@@ -125,15 +125,17 @@ vec4 sample_camera(Path path) {
 
 // The numbers of the vertex at the end of a segment.
 vec4 vertex_numbers(Path path, uint segment) {
-    vec4 own = sample_set(path, 2u * segment + 1u);
-    if (HAS_SHARING && segment == 0u) {
-        // Light that the first vertex samples is not shared, and better spread over the whole render; directions to what is shared are
-        // better spread over the group.
-        own.xy = numbers_of_set(params.seed, path.pixel, 1u, path.sample_index).xy;
-        uint index = group_index(path.sample_index) * SHARERS + path.member;
-        own.zw = numbers_of_set(group_seed(params.seed, path.sample_index), path.group, 1u, index).zw;
+    if (!HAS_SHARING) {
+        return sample_set(path, 2u * segment + 1u);
     }
-    return own;
+    bool first = segment == 0u;
+    uint seed = first ? group_seed(params.seed, path.sample_index) : half_seed(params.seed, path.sample_index);
+    uint index = first ? group_index(path.sample_index) * SHARERS + path.member : half_index(path.sample_index);
+    vec4 numbers = numbers_of_set(seed, first ? path.group : path.pixel, 2u * segment + 1u, index);
+    // Light that the first vertex samples is not shared, and better spread over the whole render; directions to what is shared are
+    // better spread over the group.
+    vec2 light = numbers_of_set(params.seed, path.pixel, 1u, path.sample_index).xy;
+    return vec4(first ? light : numbers.xy, numbers.zw);
 }
 
 // The numbers for a camera's lens.

@@ -192,9 +192,8 @@ pub fn sample_camera(tables: &Tables, path: &Path) -> DVec4 {
 
 /// The numbers of the vertex at the end of a segment.
 pub fn vertex_numbers(tables: &Tables, path: &Path, segment: u32) -> DVec4 {
-    let own = sample_set(tables, path, 2 * segment + 1);
     if tables.features.sharers == 0 || segment > 0 {
-        return own;
+        return sample_set(tables, path, 2 * segment + 1);
     }
     let of_render = numbers_of_set(tables, tables.params.seed, path.pixel, 1, path.sample_index);
     let seed = group_seed(tables.params.seed, path.sample_index);

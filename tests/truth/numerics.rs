@@ -79,10 +79,10 @@ fn free_flights() {
     // The kernel takes -log(1 - xi) from the kernel of elementary functions.
     let logs: Vec<[f32; 4]> =
         rows.iter().flat_map(|row| [units::vec4(&[row.number("xi"), 1.0]), units::vec4(&[0.0, 0.0, 1.0])]).collect();
-    let logs: Vec<[f32; 4]> = units::run("math", &logs, &[], rows.len(), 3 * rows.len());
+    let logs: Vec<[f32; 4]> = units::run("math", &logs, &[], rows.len(), 4 * rows.len());
     let inputs: Vec<[f32; 4]> = rows
         .iter()
-        .zip(logs.chunks(3))
+        .zip(logs.chunks(4))
         .flat_map(|(row, log)| {
             let one = units::vec4(&[1.0, 1.0, 1.0]);
             [units::vec4(&[0.5, f64::from(log[0][0]), row.number("sigma_t")]), one, one, one, one]
