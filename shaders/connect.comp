@@ -39,7 +39,11 @@ void main() {
     Walk walk = Walk(0u, 0u, 0u);
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {
-            if (HAS_GRIDS && asked && !hit.blocked && advance_shadow(path, hit, true)) {
+            DenseWay through = DenseWay(0.0, 0.0, false);
+            if (HAS_DENSITIES && asked) {
+                through = way_through_density(path, hit);
+            }
+            if (HAS_GRIDS && asked && !hit.blocked && advance_shadow(path, hit, true, through)) {
                 begin_ray(path, ray, grid, walk, hit);
                 continue;
             }

@@ -8,7 +8,7 @@
 //! Which pixels these are is found once, from the scene alone, so that the samples of a render can be split and merged as ever.
 
 use crate::pack::Packed;
-use crate::pack::layout::{MEDIUM_HEIGHT, MEDIUM_VOXELS, PRIMITIVE_SPHERE, Primitive};
+use crate::pack::layout::{MEDIUM_DENSITY, MEDIUM_VOXELS, PRIMITIVE_SPHERE, Primitive};
 use crate::reference::bindings::Tables;
 use crate::reference::math::exp_minus_rgb;
 use crate::reference::path::{Path, begin_hit, path_start};
@@ -62,7 +62,7 @@ impl Seen {
     pub fn find(packed: &mut Packed) -> Option<Seen> {
         let features = &packed.features;
         let by_chance = features.grids || features.masks || features.panes || features.lens;
-        let voxels = packed.media.iter().any(|medium| medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT) != 0);
+        let voxels = packed.media.iter().any(|medium| medium.grids & (MEDIUM_VOXELS | MEDIUM_DENSITY) != 0);
         if by_chance || voxels || features.hide_emitters {
             return None;
         }

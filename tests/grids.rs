@@ -10,14 +10,27 @@ use common::statistics::mean_and_error;
 use common::tolerances::comparison;
 use common::units::{run, vec4, widen};
 use glam::{DMat4, DVec3};
+use std::sync::Arc;
 use tyndall::pack::Packed;
-use tyndall::pack::layout::{self, MEDIUM_VOXELS};
+use tyndall::pack::layout::{self, MEDIUM_DENSITY, MEDIUM_VOXELS};
 use tyndall::reference::grid as reference;
 use tyndall::reference::rng::pcg4d;
 use tyndall::scene::{Camera, Film, Filter, GridVolume, HeightVolume, Medium, Phase, Scene, Shape, Volume, Wrap};
 
+/// The same with voxels that have three numbers, all alike: through those, light is tracked.
+fn packed(mut volume: Volume, sigma_t: DVec3) -> Packed {
+    if let Volume::Grid(field) = &mut volume
+        && field.grid.channels() == 1
+    {
+        let [x, y, z] = field.grid.resolution().map(|side| side as usize);
+        let values = field.grid.values().iter().flat_map(|value| [*value; 3]).collect();
+        field.grid = Arc::new(tyndall::scene::Grid::new([x, y, z], 3, values).expect("they were valid before"));
+    }
+    packed_density(volume, sigma_t)
+}
+
 /// A scene with a medium whose density is a field, in a box that does not matter.
-fn packed(volume: Volume, sigma_t: DVec3) -> Packed {
+fn packed_density(volume: Volume, sigma_t: DVec3) -> Packed {
     let mut scene = Scene::new(Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, 40.0), Film::new(8, 8));
     let mut medium = Medium::new("field", sigma_t, DVec3::ONE, Phase::Isotropic);
     medium.volumes.sigma_t = Some(volume);
@@ -96,6 +109,14 @@ fn voxels_have_mitsuba_s_values() {
         for (index, (answer, value)) in answers.chunks(4).zip(values).enumerate() {
             let got = f64::from(answer[0][0]);
             assert!((got - value).abs() < 2e-6, "{filter:?} {wrap:?} {:?}: {got}, expected {value}", points[index]);
+        }
+        // A density, within its box.
+        let volume = GridVolume { grid: voxels.clone(), to_world: DMat4::IDENTITY, filter, wrap };
+        let density = packed_density(Volume::Grid(volume), DVec3::ONE);
+        assert_eq!(density.media[1].grids & (MEDIUM_DENSITY | MEDIUM_VOXELS), MEDIUM_DENSITY);
+        for (index, answer) in ask(&density.grids, &density.values, &queries[..5]).chunks(4).enumerate() {
+            let got = f64::from(answer[3][3]);
+            assert!((got - values[index]).abs() < 2e-6, "{filter:?} {wrap:?} {:?}: {got}", points[index]);
         }
         // A look-up half a voxel off is another field.
         let shifted: Vec<(usize, Query)> = queries
@@ -233,6 +254,105 @@ fn fog_that_thins_out_agrees_with_the_reference_and_with_quadrature() {
         }
     }
     [length, flight, log].into_iter().for_each(Comparison::finish);
+}
+
+#[test]
+fn densities_are_those_that_are_worth_their_cells() {
+    let is_density = |size: [usize; 3], sigma_t: f64, emission: f64| {
+        let voxels = grid(size, 1, |x, y, z, _| ((x + 2 * y + 3 * z) % 5) as f64 / 5.0);
+        let mut scene = Scene::new(Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, 40.0), Film::new(8, 8));
+        let mut medium = Medium::new("field", DVec3::splat(sigma_t), DVec3::ONE, Phase::Isotropic);
+        medium.emission = DVec3::splat(emission);
+        medium.volumes.sigma_t = Some(Volume::Grid(field(voxels, DMat4::IDENTITY)));
+        let id = scene.add_medium(medium);
+        scene.shapes.push(Shape::boundary("box", scenes::cuboid(DMat4::IDENTITY), id));
+        let packed = scenes::pack(&scene, 1);
+        let found = packed.media[1].grids & (MEDIUM_DENSITY | MEDIUM_VOXELS);
+        assert_eq!((packed.features.fields, packed.features.voxels), (found == MEDIUM_DENSITY, found == MEDIUM_VOXELS));
+        found == MEDIUM_DENSITY
+    };
+    assert!(is_density([8, 8, 8], 1.0, 0.0));
+    assert!(!is_density([8, 8, 8], 1.0, 1.0), "what glows is tracked");
+    // The mean chord of the unit cube is 2/3, and crosses as many cells as there are along a side.
+    assert!(!is_density([64, 64, 64], 1.0, 0.0) && is_density([64, 64, 64], 20.0, 0.0));
+    assert!(!is_density([160, 160, 160], 20.0, 0.0));
+}
+
+/// Voxels of which most are empty, and a block has the same value all over.
+fn sparse(size: [usize; 3]) -> Arc<tyndall::scene::Grid> {
+    grid(size, 1, |x, y, z, _| match (x / 7 + 2 * (y / 9) + 3 * (z / 8)) % 4 {
+        0 => 0.5,
+        1 => ((5 * x + 3 * y + 7 * z) % 11) as f64 / 11.0,
+        _ => 0.0,
+    })
+}
+
+#[test]
+fn densities_agree_with_the_reference_and_with_quadrature() {
+    let mut random = Random(15);
+    let place = DMat4::from_rotation_x(0.3) * unit_to(v(-0.9, -0.7, -0.8), v(0.8, 0.9, 0.6));
+    let mut length = comparison("dense_way's length");
+    let mut flight = comparison("dense_way");
+    for (voxels, filter, wrap) in [
+        (uneven([9, 6, 7], 1), Filter::Bilinear, Wrap::Clamp),
+        (uneven([40, 3, 30], 1), Filter::Bilinear, Wrap::Mirror),
+        (uneven([1, 1, 1], 1), Filter::Bilinear, Wrap::Repeat),
+        (uneven([16, 16, 16], 1), Filter::Nearest, Wrap::Repeat),
+        (sparse([33, 40, 29]), Filter::Bilinear, Wrap::Repeat),
+        (sparse([33, 40, 29]), Filter::Nearest, Wrap::Clamp),
+    ] {
+        let volume = GridVolume { grid: voxels, to_world: place, filter, wrap };
+        let (dense, tracked) =
+            (packed_density(Volume::Grid(volume.clone()), DVec3::splat(1e3)), packed(Volume::Grid(volume), DVec3::ONE));
+        assert_eq!(dense.media[1].grids & MEDIUM_DENSITY, MEDIUM_DENSITY);
+        let [grid, field] = [&dense, &tracked].map(|packed| reference::Grid::from(&packed.grids[0]));
+        let queries: Vec<(usize, Query)> = (0..2000)
+            .map(|k| {
+                let axes = [DVec3::X, DVec3::Y, DVec3::NEG_Z];
+                let direction = if k < 3 { axes[k] } else { random.direction() };
+                let (begin, end) = (random.between(-0.5, 0.5), random.log_between(0.1, 1e6));
+                let wanted = random.log_between(1e-4, 10.0);
+                (0, Query { begin, end, wanted, ..Query::along(random.in_cube() * 1.5, direction, DVec3::ONE) })
+            })
+            .collect();
+        for (k, ((_, query), answer)) in
+            queries.iter().zip(ask(&dense.grids, &dense.values, &queries).chunks(4)).enumerate()
+        {
+            let [t_begin, t_end, wanted] = [query.begin, query.end, query.wanted].map(|x| f64::from(x as f32));
+            let (origin, direction) = (query.origin.as_vec3().as_dvec3(), query.direction.as_vec3().as_dvec3());
+            let span = reference::Span { origin, direction, t_begin, t_end };
+            let all = reference::dense_way(&dense.values, &grid, &span, f64::INFINITY).dense;
+            length.scalar(k, answer[3][0], all);
+            let found = reference::dense_way(&dense.values, &grid, &span, wanted);
+            assert_eq!((found.dense, found.ends), (wanted.min(all), wanted <= all));
+            let up_to = |way: f64| {
+                let part = reference::Span { t_end: t_begin + way, ..span };
+                reference::dense_way(&dense.values, &grid, &part, f64::INFINITY).dense
+            };
+            // The way of the kernel is that to the wanted length, wherever the density lets a length tell.
+            if wanted < 0.999 * all {
+                assert!(
+                    (up_to(found.way) - wanted).abs() < 1e-8 * (1.0 + wanted),
+                    "{k}: {} is not {wanted}",
+                    up_to(found.way)
+                );
+                flight.scalar(k, up_to(f64::from(answer[3][1])) as f32, wanted);
+            }
+            if k < 100 {
+                let ends = reference::clip_to_grid(&field, origin, direction, t_begin, t_end);
+                let steps = 20_000;
+                let step = (ends.y - ends.x).max(0.0) / f64::from(steps);
+                let at = |i: u32| origin + direction * (ends.x + (f64::from(i) + 0.5) * step);
+                let value =
+                    |i: u32| reference::grid_value(&tracked.values, &field, reference::grid_local(&field, at(i))).x;
+                let sum = (0..steps).map(value).sum::<f64>() * step;
+                let tolerance = if filter == Filter::Nearest { 2e-3 } else { 2e-6 } * (1.0 + sum);
+                assert!((sum - all).abs() < tolerance, "{k}: {all}, by quadrature {sum}");
+                assert!(sum < 0.1 || (sum * 1.05 - all).abs() > tolerance, "a fault of 5 % is noticed");
+            }
+        }
+    }
+    [length, flight].into_iter().for_each(Comparison::finish);
 }
 
 /// Optical depth of a ray through a field, by midpoints.

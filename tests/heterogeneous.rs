@@ -17,6 +17,7 @@ fn device_and_reference_follow_the_same_paths() {
     let cases = [
         ("voxels", fields::voxels()),
         ("smoke", fields::smoke()),
+        ("fine smoke", fields::fine_smoke()),
         ("smoke in a dark ball", fields::smoke_in_a_dark_ball()),
         ("fog", fields::height_fog()),
     ];

@@ -65,31 +65,34 @@ fn cases(side: u32) -> Vec<(&'static str, Scene)> {
     let light = scenes::quad(v(-0.2, 0.5, 0.0), DVec3::X * 0.2, DVec3::Z * 0.2);
     harbour.shapes.push(Shape::lamp("lamp", light, v(20.0, 30.0, 40.0)));
     // Voxels and a density that falls with height, both with an albedo that depends on the place: the light through them is only estimated.
-    let mut smoky = Scene::new(scenes::camera(4.0), Film::new(side, side));
-    scenes::walls(&mut smoky);
-    smoky.shapes.push(scenes::lamp());
-    let place = fields::unit_to(v(-0.8, -0.7, -0.6), v(0.7, 0.6, 0.7));
-    let smoke = Medium {
-        volumes: Volumes {
-            sigma_t: Some(Volume::Grid(fields::field(fields::uneven([5, 4, 6], 1), place))),
-            albedo: Some(fields::field(
-                fields::grid([2, 2, 2], 3, |x, y, z, c| (1 + x + y + z + c) as f64 / 6.0),
-                place,
-            )),
-            emission: None,
-        },
-        ..scenes::gray(3.0, 0.9, 0.6)
+    let smoky = |size: [usize; 3]| {
+        let mut smoky = Scene::new(scenes::camera(4.0), Film::new(side, side));
+        scenes::walls(&mut smoky);
+        smoky.shapes.push(scenes::lamp());
+        let place = fields::unit_to(v(-0.8, -0.7, -0.6), v(0.7, 0.6, 0.7));
+        let smoke = Medium {
+            volumes: Volumes {
+                sigma_t: Some(Volume::Grid(fields::field(fields::uneven(size, 1), place))),
+                albedo: Some(fields::field(
+                    fields::grid([2, 2, 2], 3, |x, y, z, c| (1 + x + y + z + c) as f64 / 6.0),
+                    place,
+                )),
+                emission: None,
+            },
+            ..scenes::gray(3.0, 0.9, 0.6)
+        };
+        let smoke = smoky.add_medium(smoke);
+        smoky.shapes.push(fields::box_of("smoke", place, smoke));
+        let height = HeightVolume { scale_height: 0.3, base: v(0.0, -0.9, 0.0), up: DVec3::Y };
+        let mist = Medium {
+            volumes: Volumes { sigma_t: Some(Volume::Height(height)), ..Volumes::default() },
+            ..scenes::gray(2.0, 0.8, 0.3)
+        };
+        let mist = smoky.add_medium(mist);
+        let bottom = fields::unit_to(v(-0.95, -0.95, -0.9), v(0.95, -0.72, 0.9));
+        smoky.shapes.push(fields::box_of("mist", bottom, mist));
+        smoky
     };
-    let smoke = smoky.add_medium(smoke);
-    smoky.shapes.push(fields::box_of("smoke", place, smoke));
-    let height = HeightVolume { scale_height: 0.3, base: v(0.0, -0.9, 0.0), up: DVec3::Y };
-    let mist = Medium {
-        volumes: Volumes { sigma_t: Some(Volume::Height(height)), ..Volumes::default() },
-        ..scenes::gray(2.0, 0.8, 0.3)
-    };
-    let mist = smoky.add_medium(mist);
-    let bottom = fields::unit_to(v(-0.95, -0.95, -0.9), v(0.95, -0.72, 0.9));
-    smoky.shapes.push(fields::box_of("mist", bottom, mist));
     // Shading normals, first and second: a floor that leans as far as one can without a gap in what it reflects, and a ball of few facets.
     let mut smooth = Scene::new(scenes::camera(4.0), Film::new(side, side));
     scenes::walls(&mut smooth);
@@ -109,7 +112,9 @@ fn cases(side: u32) -> Vec<(&'static str, Scene)> {
         ("glare", glare),
         ("lantern", lantern),
         ("harbour", harbour),
-        ("smoky", smoky),
+        ("smoky", smoky([5, 4, 6])),
+        // So fine that light is tracked.
+        ("fine smoke", smoky([5, 900, 6])),
         ("wide filter", wide),
         ("eager roulette", eager),
         ("absorbing", absorbing(v(2.0, 2.0, 2.0))),

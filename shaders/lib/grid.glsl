@@ -211,6 +211,123 @@ vec3 grid_transmittance(Grid grid, vec3 sigma_t, bool whole, vec3 origin, vec3 d
     return passes * exp_minus(walk.least);
 }
 
+// How far a ray gets from where it begins, the density times length of that way, and whether that is what was wanted.
+struct DenseWay {
+    float way;
+    float dense;
+    bool ends;
+};
+
+// A density's voxels between whose centres a ray goes cell by cell. Around them stands what lies beyond the box, so that no cell lacks a
+// voxel. Of voxels without interpolation each is a cell of its own.
+struct DenseVoxels {
+    uint first;
+    uint row;       // voxels to the next one in y
+    uint layer;     // in z
+    vec3 shift;     // from the unit cube times the size to cells
+    ivec3 count;    // of cells
+    bool nearest;
+};
+
+DenseVoxels dense_voxels(Grid grid) {
+    bool nearest = (grid.flags & GRID_NEAREST) != 0u;
+    uint more = nearest ? 0u : 2u;
+    uint row = grid.size_x + more;
+    ivec3 count = ivec3(grid.size_x, grid.size_y, grid.size_z) + (nearest ? 0 : 1);
+    return DenseVoxels(grid.first_value, row, row * (grid.size_y + more), vec3(nearest ? 0.0 : 0.5), count, nearest);
+}
+
+// The density s after a place of a ray in a cell: a polynomial of s, constant first. The place is `part` of the way through the cell in each
+// axis, and moves by `step` per unit of length.
+vec4 density_along(DenseVoxels voxels, ivec3 cell, vec3 part, vec3 step) {
+    uint at = voxels.first + uint(cell.z) * voxels.layer + uint(cell.y) * voxels.row + uint(cell.x);
+    if (voxels.nearest) {
+        return vec4(VALUE(at), 0.0, 0.0, 0.0);
+    }
+    uint up = at + voxels.row, far = at + voxels.layer, corner = far + voxels.row;
+    // Along x, of the four rows (near, its neighbour in y, far, its neighbour in y): constant and slope.
+    vec4 begin = vec4(VALUE(at), VALUE(up), VALUE(far), VALUE(corner));
+    vec4 rise = vec4(VALUE(at + 1u), VALUE(up + 1u), VALUE(far + 1u), VALUE(corner + 1u)) - begin;
+    vec4 value = begin + rise * part.x, slope = rise * step.x;
+    // In the two planes, quadratic.
+    vec2 apart = value.yw - value.xz, turn = slope.yw - slope.xz;
+    vec2 c0 = value.xz + apart * part.y, c1 = slope.xz + turn * part.y + apart * step.y, c2 = turn * step.y;
+    float d0 = c0.y - c0.x, d1 = c1.y - c1.x, d2 = c2.y - c2.x;
+    return vec4(c0.x + d0 * part.z, c1.x + d1 * part.z + d0 * step.z, c2.x + d2 * part.z + d1 * step.z, d2 * step.z);
+}
+
+// The integral of such a density from 0 to s.
+float length_along(vec4 density, float s) {
+    return s * (density.x + s * (density.y * 0.5 + s * (density.z * 0.33333334 + s * (density.w * 0.25))));
+}
+
+// Voxels in a block that a ray passes in one step if they are all alike.
+const int BLOCK_SHIFT = 2;
+const int BLOCK = 1 << BLOCK_SHIFT;
+
+// The way through voxels of one number over which density times length becomes `wanted`, or else all of it. Exact: between voxel centres the
+// density along a ray is a polynomial.
+DenseWay voxel_way(Grid grid, vec3 origin, vec3 direction, float t_begin, float t_end, float wanted) {
+    vec2 clipped = clip_to_grid(grid, origin, direction, t_begin, t_end);
+    DenseVoxels voxels = dense_voxels(grid);
+    vec3 size = vec3(grid.size_x, grid.size_y, grid.size_z);
+    vec3 from = grid_local(grid, origin) * size + voxels.shift;
+    vec3 step = vec3(dot(grid.row_x, direction), dot(grid.row_y, direction), dot(grid.row_z, direction)) * size;
+    step = mix(step, vec3(1e-20), lessThan(abs(step), vec3(1e-20)));
+    vec3 inverse = 1.0 / step;
+    bvec3 forward = greaterThan(step, vec3(0.0));
+    float t = clipped.x, end = clipped.y, dense = 0.0, way = 0.0;
+    ivec3 cell = clamp(ivec3(floor(from + step * min(t, end))), ivec3(0), voxels.count - 1);
+    vec4 density = vec4(0.0);
+    bool found = false;
+    [[dont_unroll]] while (t < end) {
+        ivec3 block = cell >> BLOCK_SHIFT;
+        float same = VALUE(grid.first_cell + (uint(block.z) * grid.cells_y + uint(block.y)) * grid.cells_x + uint(block.x));
+        bool skips = same >= 0.0;
+        ivec3 low = skips ? block << BLOCK_SHIFT : cell, high = low + (skips ? BLOCK : 1);
+        vec3 leaves = (mix(vec3(low), vec3(high), forward) - from) * inverse;
+        float nearest = min(leaves.x, min(leaves.y, leaves.z));
+        way = clamp(nearest, t, end) - t;
+        density = skips ? vec4(same, 0.0, 0.0, 0.0) : density_along(voxels, cell, from + step * t - vec3(cell), step);
+        float more = length_along(density, way);
+        found = dense + more >= wanted;
+        if (found) {
+            break;
+        }
+        dense += more;
+        t += way;
+        cell = clamp(ivec3(floor(from + step * t)), low, high - 1);
+        if (leaves.x == nearest) {
+            cell.x = forward.x ? high.x : low.x - 1;
+        } else if (leaves.y == nearest) {
+            cell.y = forward.y ? high.y : low.y - 1;
+        } else {
+            cell.z = forward.z ? high.z : low.z - 1;
+        }
+        bool outside = any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, voxels.count));
+        end = outside ? t : end;
+    }
+    if (!found) {
+        return DenseWay(t_end - t_begin, dense, false);
+    }
+    // Newton's method, with bisection where it goes astray.
+    float left = wanted - dense, low = 0.0, high = way, s = way * min(left / max(length_along(density, way), 1e-37), 1.0);
+    [[dont_unroll]] for (uint i = 0u; i < 16u; ++i) {
+        float excess = length_along(density, s) - left;
+        low = excess < 0.0 ? s : low;
+        high = excess < 0.0 ? high : s;
+        float here = density.x + s * (density.y + s * (density.z + s * density.w));
+        float next = s - excess / max(here, 1e-37);
+        next = next >= low && next <= high ? next : 0.5 * (low + high);
+        float moved = abs(next - s);
+        s = next;
+        if (moved <= 1e-6 * way) {
+            break;
+        }
+    }
+    return DenseWay(t + s - t_begin, wanted, true);
+}
+
 // Density times length, of a density exp(-h) at a height that begins at h >= 0 and changes by slope per unit of length without getting
 // below 0: `low` is the lower one of the two ends, slope >= 0.
 float length_above(float low, float slope, float way) {
@@ -266,4 +383,27 @@ float height_flight(Grid grid, vec3 origin, vec3 direction, float t_begin, float
         return way;
     }
     return above + max(wanted - length_above(0.0, steep, above), 0.0);
+}
+
+// The way over which density times length becomes `wanted`, or else all of it.
+DenseWay dense_way(Grid grid, vec3 origin, vec3 direction, float t_begin, float t_end, float wanted) {
+    if (HAS_FIELDS && (!HAS_HEIGHTS || grid.size_x > 0u)) {
+        return voxel_way(grid, origin, direction, t_begin, t_end, wanted);
+    }
+    float dense = height_length(grid, origin, direction, t_begin, t_end), way = t_end - t_begin;
+    bool ends = wanted < dense;
+    if (ends) {
+        way = min(height_flight(grid, origin, direction, t_begin, wanted), way);
+    }
+    return DenseWay(way, ends ? wanted : dense, ends);
+}
+
+float density_at(Grid grid, vec3 point) {
+    if (HAS_FIELDS && (!HAS_HEIGHTS || grid.size_x > 0u)) {
+        DenseVoxels voxels = dense_voxels(grid);
+        vec3 place = grid_local(grid, point) * vec3(grid.size_x, grid.size_y, grid.size_z) + voxels.shift;
+        ivec3 cell = clamp(ivec3(floor(place)), ivec3(0), voxels.count - 1);
+        return density_along(voxels, cell, clamp(place - vec3(cell), vec3(0.0), vec3(1.0)), vec3(0.0)).x;
+    }
+    return height_density(grid, point);
 }

@@ -259,7 +259,7 @@ void choose_surface(Path path, inout Surface surface, Primitive primitive, Hit h
 
 // What a ray that extends the path meets. Returns whether it is a vertex that scatters; else the path ends, or goes on along the
 // same ray. (Kernels compute both sides of a branch for some paths or others, so nothing stands here twice.)
-bool meet(inout Path path, Hit hit, out Vertex vertex) {
+bool meet(inout Path path, Hit hit, DenseWay through, out Vertex vertex) {
     bool surface_hit = hit.primitive != NONE && hit.t < path.t_max;
     float t = surface_hit ? hit.t : path.t_max;
 
@@ -274,8 +274,8 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
             } else {
                 end = end_voxel_flight(path, medium, t, emitters_seen(path));
             }
-        } else if (HAS_HEIGHTS && (medium.grids & MEDIUM_HEIGHT) != 0u) {
-            end = end_height_flight(path, medium, t);
+        } else if (HAS_DENSITIES && (medium.grids & MEDIUM_DENSITY) != 0u) {
+            end = end_dense_flight(path, medium, through);
         } else {
             end = end_flight(path, medium, t, surface_hit);
         }
@@ -402,8 +402,8 @@ bool meet(inout Path path, Hit hit, out Vertex vertex) {
 }
 
 // Adds what a shadow ray brings, or takes it further.
-void path_light(inout Path path, Hit hit) {
-    if (HAS_GRIDS && !hit.blocked && advance_shadow(path, hit, false)) {
+void path_light(inout Path path, Hit hit, DenseWay through) {
+    if (HAS_GRIDS && !hit.blocked && advance_shadow(path, hit, false, through)) {
         return;
     }
     if (!hit.blocked) {
@@ -440,12 +440,16 @@ void path_light(inout Path path, Hit hit) {
 
 // Answers the ray that the path asked for.
 void path_answer(inout Path path, Hit hit) {
+    DenseWay through = DenseWay(0.0, 0.0, false);
+    if (HAS_DENSITIES) {
+        through = way_through_density(path, hit);
+    }
     bool leaves = true; // a vertex
     if (HAS_LIGHT_SAMPLING && path.shadow) {
-        path_light(path, hit);
+        path_light(path, hit, through);
     } else {
         Vertex vertex;
-        leaves = meet(path, hit, vertex);
+        leaves = meet(path, hit, through, vertex);
         if (HAS_SHARING && leaves && path.depth < 2u) {
             share_vertex(path, vertex);
         }

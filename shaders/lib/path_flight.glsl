@@ -81,19 +81,24 @@ FlightEnd end_flight(Path path, Medium medium, float t_end, bool surface) {
     return end;
 }
 
-// The same in a medium whose density falls with height: its optical depths are those of a homogeneous medium, with density times
-// length in the place of lengths.
-FlightEnd end_height_flight(Path path, Medium medium, float t_end) {
-    Grid grid = GRID((medium.grids & 0xffffffu) - 1u);
-    float dense = height_length(grid, path.origin, path.direction, path.t_min, t_end);
-    FlightEnd end = FlightEnd(false, t_end - path.t_min, medium.albedo, dense);
-    float wanted = free_way(path, medium);
-    if (wanted < dense) {
-        end.scatters = true;
-        end.way = min(height_flight(grid, path.origin, path.direction, path.t_min, wanted), end.way);
-        if (HAS_CHROMATIC) {
-            end.weight = scatter_weight(channel_weights(path.throughput), path.tau_rgb + medium.sigma_t * wanted, medium.sigma_t, medium.albedo);
-        }
+// The way of a flight, or of a shadow ray, through a medium with a density, up to where the ray ends.
+DenseWay way_through_density(Path path, Hit hit) {
+    DenseWay found = DenseWay(0.0, 0.0, false);
+    Medium medium = MEDIUM(valid_medium(path.medium));
+    if ((medium.grids & MEDIUM_DENSITY) != 0u && !(path.shadow && hit.blocked)) {
+        float t_end = hit.primitive != NONE ? min(hit.t, path.t_max) : path.t_max;
+        float wanted = path.shadow ? INFINITE_DISTANCE : free_way(path, medium);
+        found = dense_way(GRID((medium.grids & 0xffffffu) - 1u), path.origin, path.direction, path.t_min, t_end, wanted);
+    }
+    return found;
+}
+
+// The same in a medium with a density: its optical depths are those of a homogeneous medium, with density times length in the place of
+// lengths.
+FlightEnd end_dense_flight(Path path, Medium medium, DenseWay found) {
+    FlightEnd end = FlightEnd(found.ends, found.way, medium.albedo, found.dense);
+    if (HAS_CHROMATIC && end.scatters) {
+        end.weight = scatter_weight(channel_weights(path.throughput), path.tau_rgb + medium.sigma_t * found.dense, medium.sigma_t, medium.albedo);
     }
     return end;
 }
@@ -179,8 +184,8 @@ vec2 extinction_at(Medium medium, vec3 point) {
         vec3 local = grid_local(grid, point);
         return vec2(sigma * grid_value(grid, local).x, grid_mean(grid, local));
     }
-    if (HAS_HEIGHTS && (medium.grids & MEDIUM_HEIGHT) != 0u) {
-        sigma *= height_density(GRID(first), point);
+    if (HAS_DENSITIES && (medium.grids & MEDIUM_DENSITY) != 0u) {
+        sigma *= density_at(GRID(first), point);
     }
     return vec2(sigma);
 }
@@ -196,7 +201,7 @@ vec3 albedo_factor(Medium medium, vec3 point) {
 
 // A stretch of a shadow ray from t_min to t_end, within one medium. Where nothing passes, its mean optical depth is known only where the
 // `whole` is asked for.
-void pass_medium(inout Path path, float t_end, bool whole) {
+void pass_medium(inout Path path, float t_end, bool whole, DenseWay through) {
     Medium medium = MEDIUM(valid_medium(path.medium));
     uint first = (medium.grids & 0xffffffu) - 1u;
     if (HAS_VOXELS && (medium.grids & MEDIUM_VOXELS) != 0u) {
@@ -207,8 +212,8 @@ void pass_medium(inout Path path, float t_end, bool whole) {
         return;
     }
     float dense = t_end - path.t_min;
-    if (HAS_HEIGHTS && (medium.grids & MEDIUM_HEIGHT) != 0u) {
-        dense = height_length(GRID(first), path.origin, path.direction, path.t_min, t_end);
+    if (HAS_DENSITIES && (medium.grids & MEDIUM_DENSITY) != 0u) {
+        dense = through.dense;
     }
     path.tau_rgb += medium.sigma_t * dense;
     path.tau_mean += medium.sigma_t * dense;

@@ -18,9 +18,9 @@ void cross_surface(inout Path path, Surface surface, Hit hit) {
 
 // Takes a shadow ray to the next boundary, or to its end; whether it has to go on from there. One of which nothing is left ends, unless the
 // `whole` way is asked for.
-bool advance_shadow(inout Path path, inout Hit hit, bool whole) {
+bool advance_shadow(inout Path path, inout Hit hit, bool whole, DenseWay through) {
     bool reaches = hit.primitive == NONE;
-    pass_medium(path, reaches ? path.t_max : hit.t, whole);
+    pass_medium(path, reaches ? path.t_max : hit.t, whole, through);
     if (!whole && max_component(path.light_passes) == 0.0) {
         hit.blocked = true;
         return false;

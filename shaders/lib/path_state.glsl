@@ -167,7 +167,7 @@ float flight_end(Path path) {
         return path.far_end;
     }
     Medium medium = MEDIUM(valid_medium(path.medium));
-    if (HAS_GRIDS && (medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT)) != 0u) {
+    if (HAS_GRIDS && (medium.grids & (MEDIUM_VOXELS | MEDIUM_DENSITY)) != 0u) {
         return path.far_end;
     }
     vec3 sigma_t = medium.sigma_t;

@@ -25,8 +25,12 @@ pub struct Features {
     pub grids: bool,
     /// A medium whose extinction coefficient comes from voxels.
     pub voxels: bool,
-    /// A medium whose extinction coefficient falls with height.
+    /// A medium with a density whose optical depths are known.
+    pub densities: bool,
+    /// One that falls with height.
     pub heights: bool,
+    /// One of voxels.
+    pub fields: bool,
     /// A surface that rays cross without an event.
     pub boundaries: bool,
     /// Spheres among the primitives.
@@ -133,6 +137,10 @@ impl Features {
         let lowest = (1 << LIGHT_TEXTURE_SHIFT) - 1;
         let kind = |kind: u32| packed.lights.iter().any(|light| light.kind & lowest == kind);
         let bsdf = |kind: u32| packed.surfaces.iter().any(|surface| surface.flags >> SURFACE_KIND_SHIFT == kind);
+        let density = |is: &dyn Fn(&Grid) -> bool| {
+            let dense = packed.media.iter().filter(|medium| medium.grids & MEDIUM_DENSITY != 0);
+            media && dense.map(|medium| &packed.grids[(medium.grids & 0xff_ffff) as usize - 1]).any(is)
+        };
         let flag = |bit: u32| packed.surfaces.iter().any(|surface| surface.flags & bit != 0);
         let area_lights = kind(LIGHT_TRIANGLE) || kind(LIGHT_QUAD) || kind(LIGHT_RECTANGLE) || kind(LIGHT_SPHERE);
         let max_depth = max_depth.unwrap_or(u32::MAX);
@@ -151,7 +159,9 @@ impl Features {
             volume_lights: kind(LIGHT_VOLUME),
             grids: media && packed.media.iter().any(|medium| medium.grids & !MEDIUM_SEALED != 0),
             voxels: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_VOXELS != 0),
-            heights: media && packed.media.iter().any(|medium| medium.grids & MEDIUM_HEIGHT != 0),
+            densities: density(&|_| true),
+            heights: density(&|grid| grid.size_x == 0),
+            fields: density(&|grid| grid.size_x > 0),
             boundaries: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_BOUNDARY != 0),
             spheres: packed.primitives.iter().any(|primitive| primitive.surface & PRIMITIVE_SPHERE != 0),
             area_lights,
@@ -231,7 +241,9 @@ impl Features {
             volume_lights: true,
             grids: true,
             voxels: true,
+            densities: true,
             heights: true,
+            fields: true,
             boundaries: true,
             spheres: true,
             area_lights: true,
@@ -289,7 +301,9 @@ impl Features {
             ("HAS_VOLUME_LIGHTS", self.volume_lights),
             ("HAS_GRIDS", self.grids),
             ("HAS_VOXELS", self.voxels),
+            ("HAS_DENSITIES", self.densities),
             ("HAS_HEIGHTS", self.heights),
+            ("HAS_FIELDS", self.fields),
             ("HAS_BOUNDARIES", self.boundaries),
             ("HAS_SPHERES", self.spheres),
             ("HAS_AREA_LIGHTS", self.area_lights),

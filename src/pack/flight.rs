@@ -1,7 +1,7 @@
 //! How distances are sampled in each medium.
 
 use super::frame::{Bounds, Frame};
-use super::layout::{LIGHT_VOLUME, Light, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, Medium};
+use super::layout::{LIGHT_VOLUME, Light, MEDIUM_DENSITY, MEDIUM_SEALED, MEDIUM_VOXELS, Medium};
 use super::lights::is_near;
 use super::nesting::Nesting;
 use crate::scene::{MediumId, Scene};
@@ -54,7 +54,7 @@ pub fn choose_equiangular(scene: &Scene, nesting: &Nesting, frame: &Frame, light
     }
     for (index, medium) in media.iter_mut().enumerate().skip(1) {
         // Where the density depends on the place, it decides where light is scattered.
-        if medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT | MEDIUM_SEALED) != 0 {
+        if medium.grids & (MEDIUM_VOXELS | MEDIUM_DENSITY | MEDIUM_SEALED) != 0 {
             continue;
         }
         let id = MediumId(index as u32 - 1);

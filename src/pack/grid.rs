@@ -3,7 +3,7 @@
 use super::PackError;
 use super::frame::{Bounds, Frame};
 use super::layout::{
-    GRID_CLAMP, GRID_MIRROR, GRID_NEAREST, GRID_RGB, Grid, MEDIUM_ALBEDO_GRID, MEDIUM_EMISSION_GRID, MEDIUM_HEIGHT,
+    GRID_CLAMP, GRID_MIRROR, GRID_NEAREST, GRID_RGB, Grid, MEDIUM_ALBEDO_GRID, MEDIUM_DENSITY, MEDIUM_EMISSION_GRID,
     MEDIUM_VOXELS,
 };
 use crate::scene::{self, Filter, GridVolume, HeightVolume, Scene, Volume, Wrap};
@@ -14,6 +14,10 @@ use std::sync::Arc;
 /// Voxels along the side of a cell of a large grid. Cells of fewer voxels bound the density more closely, but there are more to walk
 /// through.
 const CELL_VOXELS: u32 = 8;
+/// A tentative collision costs as much as so many cells of a density, for the variance that it brings.
+const CELLS_PER_COLLISION: f64 = 8.0;
+/// Cells along the side of a block; that of `grid.glsl`.
+const BLOCK: usize = 4;
 /// Cells along a side of a small grid, unless it has fewer voxels.
 const LEAST_CELLS: u32 = 8;
 /// Most cells along a side.
@@ -33,6 +37,7 @@ pub struct GridTable {
     /// Three for each medium that is not homogeneous: of the extinction coefficient, the albedo and the emission.
     pub grids: Vec<Grid>,
     voxels: Vec<(Arc<scene::Grid>, u32)>,
+    densities: Vec<(Arc<scene::Grid>, (Filter, Wrap), u32)>,
 }
 
 impl GridTable {
@@ -58,7 +63,7 @@ impl GridTable {
         match &fields.sigma_t {
             None => {}
             Some(Volume::Height(height)) => {
-                code |= MEDIUM_HEIGHT;
+                code |= MEDIUM_DENSITY;
                 entries[0] = height_grid(height, frame);
             }
             Some(Volume::Grid(field)) => {
@@ -67,9 +72,21 @@ impl GridTable {
                     let value = f64::from(sigma_t.max_element()) * f64::from(field.grid.max());
                     return Err(PackError::OutOfRange { what: "sigma_t", name: medium.name.clone(), value });
                 }
-                code |= MEDIUM_VOXELS;
-                entries[0] = self.voxel_grid(field, frame, values)?;
-                let (cells, numbers) = cells(field, medium, sigma_t, &entries[0]);
+                let place = placed(field, frame);
+                let tracked = cells(field, medium, sigma_t, &place);
+                // What glows is found at tentative collisions.
+                let one = field.grid.channels() == 1 && medium.emission == DVec3::ZERO;
+                let dense =
+                    one.then(|| blocks(field)).filter(|(_, blocks)| is_worth_its_cells(&place, blocks, &tracked.1));
+                let (cells, numbers) = if let Some(dense) = dense {
+                    code |= MEDIUM_DENSITY;
+                    entries[0] = Grid { first_value: self.first_dense_value(field, values)?, ..place };
+                    dense
+                } else {
+                    code |= MEDIUM_VOXELS;
+                    entries[0] = Grid { first_value: self.first_value(&field.grid, values)?, ..place };
+                    tracked
+                };
                 room(values, numbers.len())?;
                 [entries[0].cells_x, entries[0].cells_y, entries[0].cells_z] = cells;
                 entries[0].first_cell = values.len() as u32;
@@ -89,31 +106,7 @@ impl GridTable {
 
     /// A grid without cells.
     fn voxel_grid(&mut self, field: &GridVolume, frame: &Frame, values: &mut Vec<f32>) -> Result<Grid, PackError> {
-        let [size_x, size_y, size_z] = field.grid.resolution();
-        let wrap = match field.wrap {
-            Wrap::Repeat => 0,
-            Wrap::Mirror => GRID_MIRROR,
-            Wrap::Clamp => GRID_CLAMP,
-        };
-        let nearest = if field.filter == Filter::Nearest { GRID_NEAREST } else { 0 };
-        let rgb = if field.grid.channels() == 3 { GRID_RGB } else { 0 };
-        let to_local = to_local(field, frame);
-        let row = |k: usize| to_local.row(k).truncate().as_vec3();
-        let shift = |k: usize| to_local.row(k).w as f32;
-        Ok(Grid {
-            row_x: row(0),
-            shift_x: shift(0),
-            row_y: row(1),
-            shift_y: shift(1),
-            row_z: row(2),
-            shift_z: shift(2),
-            size_x,
-            size_y,
-            size_z,
-            flags: wrap | nearest | rgb,
-            first_value: self.first_value(&field.grid, values)?,
-            ..Grid::default()
-        })
+        Ok(Grid { first_value: self.first_value(&field.grid, values)?, ..placed(field, frame) })
     }
 
     /// Where the voxels begin among the values.
@@ -127,12 +120,58 @@ impl GridTable {
         self.voxels.push((grid.clone(), first));
         Ok(first)
     }
+
+    /// Where the voxels of a density begin, with those beyond the box around them that interpolation takes.
+    fn first_dense_value(&mut self, field: &GridVolume, values: &mut Vec<f32>) -> Result<u32, PackError> {
+        let GridVolume { grid, filter, wrap, .. } = field;
+        if let Some((.., first)) =
+            self.densities.iter().find(|(known, as_known, _)| Arc::ptr_eq(known, grid) && *as_known == (*filter, *wrap))
+        {
+            return Ok(*first);
+        }
+        let [xs, ys, zs] = voxels_of_cells(field);
+        room(values, xs.len() * ys.len() * zs.len())?;
+        let first = values.len() as u32;
+        for (z, y) in zs.iter().flat_map(|z| ys.iter().map(move |y| (*z, *y))) {
+            values.extend(xs.iter().map(|x| grid.voxel(*x, y, z)[0]));
+        }
+        self.densities.push((grid.clone(), (*filter, *wrap), first));
+        Ok(first)
+    }
 }
 
 /// Whether the values have room for so many more.
 fn room(values: &[f32], more: usize) -> Result<(), PackError> {
     let count = values.len() + more;
     if u32::try_from(count).is_ok() { Ok(()) } else { Err(PackError::TooManyValues(count)) }
+}
+
+/// Where a grid is and how it is read.
+fn placed(field: &GridVolume, frame: &Frame) -> Grid {
+    let [size_x, size_y, size_z] = field.grid.resolution();
+    let wrap = match field.wrap {
+        Wrap::Repeat => 0,
+        Wrap::Mirror => GRID_MIRROR,
+        Wrap::Clamp => GRID_CLAMP,
+    };
+    let nearest = if field.filter == Filter::Nearest { GRID_NEAREST } else { 0 };
+    let rgb = if field.grid.channels() == 3 { GRID_RGB } else { 0 };
+    let to_local = to_local(field, frame);
+    let row = |k: usize| to_local.row(k).truncate().as_vec3();
+    let shift = |k: usize| to_local.row(k).w as f32;
+    Grid {
+        row_x: row(0),
+        shift_x: shift(0),
+        row_y: row(1),
+        shift_y: shift(1),
+        row_z: row(2),
+        shift_z: shift(2),
+        size_x,
+        size_y,
+        size_z,
+        flags: wrap | nearest | rgb,
+        ..Grid::default()
+    }
 }
 
 /// From the canonical frame to the unit cube of a grid.
@@ -182,6 +221,48 @@ fn wrapped(index: i64, size: u32, wrap: Wrap) -> u32 {
         }
     };
     inside as u32
+}
+
+/// The voxels between which the cells of a density lie, in each axis: with interpolation one more at either end than the box has.
+fn voxels_of_cells(field: &GridVolume) -> [Vec<u32>; 3] {
+    let more = if field.filter == Filter::Nearest { 0 } else { 1 };
+    let size = field.grid.resolution();
+    size.map(|side| (-more..i64::from(side) + more).map(|voxel| wrapped(voxel, side, field.wrap)).collect())
+}
+
+/// Blocks of a density's cells along each side, and of each the value of all of its voxels, or −1 where they differ; x fastest.
+fn blocks(field: &GridVolume) -> ([u32; 3], Vec<f32>) {
+    let voxels = voxels_of_cells(field);
+    let more = if field.filter == Filter::Nearest { 0 } else { 1 };
+    let counts = [0, 1, 2].map(|k| (voxels[k].len() - more).div_ceil(BLOCK) as u32);
+    let numbers = (0..counts.iter().product::<u32>()).into_par_iter().map(|index| {
+        let at = [index % counts[0], index / counts[0] % counts[1], index / counts[0] / counts[1]];
+        let [xs, ys, zs] = [0, 1, 2].map(|k| {
+            let first = at[k] as usize * BLOCK;
+            &voxels[k][first..(first + BLOCK + more).min(voxels[k].len())]
+        });
+        let value = |x: u32, y: u32, z: u32| field.grid.voxel(x, y, z)[0];
+        let first = value(xs[0], ys[0], zs[0]);
+        let alike = zs.iter().all(|&z| ys.iter().all(|&y| xs.iter().all(|&x| value(x, y, z) == first)));
+        if alike { first } else { -1.0 }
+    });
+    (counts, numbers.collect())
+}
+
+/// Whether to go through the cells of a density one by one, rather than to track: by how many of them the mean chord of the box crosses, those
+/// of blocks that are alike aside, and how many tentative collisions there would be on it.
+fn is_worth_its_cells(place: &Grid, blocks: &[f32], tracked: &[f32]) -> bool {
+    let sides = [place.row_x, place.row_y, place.row_z].map(|row| 1.0 / f64::from(row.length()));
+    let [x, y, z] = sides;
+    // Cauchy (1841): four times the volume over the surface.
+    let chord = 2.0 * x * y * z / (x * y + y * z + z * x);
+    let counts = [place.size_x, place.size_y, place.size_z];
+    // A random direction crosses on average half as many cells of an axis as there are on the way along it.
+    let crossed = counts.iter().zip(sides).map(|(count, side)| f64::from(*count) / side / 2.0).sum::<f64>();
+    let uneven = blocks.iter().filter(|value| **value < 0.0).count() as f64 / blocks.len() as f64;
+    let rates = tracked.chunks_exact(CELL_NUMBERS).map(|numbers| f64::from(numbers[3]));
+    let rate = rates.sum::<f64>() / (tracked.len() / CELL_NUMBERS) as f64;
+    uneven * crossed * chord <= CELLS_PER_COLLISION * (1.0 + rate * chord)
 }
 
 /// Cells along each side, and the numbers of each cell, x fastest.

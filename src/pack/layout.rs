@@ -560,8 +560,9 @@ pub const GRID_CLAMP: u32 = 4;
 pub const GRID_RGB: u32 = 8;
 /// [`Medium::grids`]: voxels are a factor of the extinction coefficient.
 pub const MEDIUM_VOXELS: u32 = 1 << 24;
-/// [`Medium::grids`]: the extinction coefficient falls with height.
-pub const MEDIUM_HEIGHT: u32 = 1 << 25;
+/// [`Medium::grids`]: a density is a factor of the extinction coefficient whose optical depths are known: voxels of one number, or one that
+/// falls with height.
+pub const MEDIUM_DENSITY: u32 = 1 << 25;
 /// [`Medium::grids`]: voxels are a factor of the albedo.
 pub const MEDIUM_ALBEDO_GRID: u32 = 1 << 26;
 /// [`Medium::grids`]: voxels are a factor of the emission.
@@ -642,7 +643,7 @@ pub fn glsl() -> String {
         ("GRID_CLAMP", GRID_CLAMP),
         ("GRID_RGB", GRID_RGB),
         ("MEDIUM_VOXELS", MEDIUM_VOXELS),
-        ("MEDIUM_HEIGHT", MEDIUM_HEIGHT),
+        ("MEDIUM_DENSITY", MEDIUM_DENSITY),
         ("MEDIUM_SEALED", MEDIUM_SEALED),
         ("MEDIUM_ALBEDO_GRID", MEDIUM_ALBEDO_GRID),
         ("MEDIUM_EMISSION_GRID", MEDIUM_EMISSION_GRID),

@@ -325,3 +325,157 @@ pub fn height_flight(grid: &Grid, origin: DVec3, direction: DVec3, t_begin: f64,
     };
     if way <= above { way } else { above + (wanted - length_above(0.0, steep, above)).max(0.0) }
 }
+
+/// A density's voxels, and what lies beyond the box around them.
+struct DenseVoxels {
+    first: u32,
+    row: u32,
+    layer: u32,
+    shift: DVec3,
+    count: IVec3,
+    nearest: bool,
+}
+
+fn dense_voxels(grid: &Grid) -> DenseVoxels {
+    let nearest = grid.flags & GRID_NEAREST != 0;
+    let more = if nearest { 0 } else { 2 };
+    let row = grid.size[0] + more;
+    DenseVoxels {
+        first: grid.first_value,
+        row,
+        layer: row * (grid.size[1] + more),
+        shift: DVec3::splat(if nearest { 0.0 } else { 0.5 }),
+        count: IVec3::from_array(grid.size.map(|side| side as i32 + i32::from(!nearest))),
+        nearest,
+    }
+}
+
+/// The density `s` after a place of a ray in a cell: a polynomial of s, constant first.
+fn density_along(values: &[f32], voxels: &DenseVoxels, cell: IVec3, part: DVec3, step: DVec3) -> DVec4 {
+    let first = voxels.first + cell.z as u32 * voxels.layer + cell.y as u32 * voxels.row + cell.x as u32;
+    let voxel = |x: u32, y: u32, z: u32| {
+        DVec4::new(f64::from(values[(first + z * voxels.layer + y * voxels.row + x) as usize]), 0.0, 0.0, 0.0)
+    };
+    if voxels.nearest {
+        return voxel(0, 0, 0);
+    }
+    // Interpolates two polynomials, by a part that grows by `step`.
+    let between = |from: DVec4, to: DVec4, part: f64, step: f64| {
+        let rise = to - from;
+        from + rise * part + DVec4::new(0.0, rise.x, rise.y, rise.z) * step
+    };
+    let row = |y: u32, z: u32| between(voxel(0, y, z), voxel(1, y, z), part.x, step.x);
+    let plane = |z: u32| between(row(0, z), row(1, z), part.y, step.y);
+    between(plane(0), plane(1), part.z, step.z)
+}
+
+/// The integral of such a density from 0 to s.
+fn length_along(density: DVec4, s: f64) -> f64 {
+    s * (density.x + s * (density.y / 2.0 + s * (density.z / 3.0 + s * (density.w / 4.0))))
+}
+
+/// Cells along the side of a block that a ray passes in one step if they are all alike.
+const BLOCK: i32 = 4;
+
+/// How far a ray gets.
+#[derive(Clone, Copy, Debug)]
+pub struct DenseWay {
+    /// From where it begins.
+    pub way: f64,
+    /// Density times length of that way.
+    pub dense: f64,
+    /// Whether that is what was wanted.
+    pub ends: bool,
+}
+
+/// The way through voxels of one number over which density times length becomes `wanted`, or else all of it.
+fn voxel_way(values: &[f32], grid: &Grid, span: &Span, wanted: f64) -> DenseWay {
+    let clipped = clip_to_grid(grid, span.origin, span.direction, span.t_begin, span.t_end);
+    let voxels = dense_voxels(grid);
+    let size = DVec3::from_array(grid.size.map(f64::from));
+    let from = grid_local(grid, span.origin) * size + voxels.shift;
+    let step = away_from_zero(grid.direction(span.direction) * size);
+    let forward = step.cmpgt(DVec3::ZERO);
+    let (mut t, mut end, mut dense) = (clipped.x, clipped.y, 0.0);
+    let mut cell = (from + step * t.min(end)).floor().as_ivec3().clamp(IVec3::ZERO, voxels.count - 1);
+    while t < end {
+        let block = cell / BLOCK;
+        let at = (block.z as u32 * grid.cells[1] + block.y as u32) * grid.cells[0] + block.x as u32;
+        let same = f64::from(values[(grid.first_cell + at) as usize]);
+        let skips = same >= 0.0;
+        let low = if skips { block * BLOCK } else { cell };
+        let high = low + if skips { BLOCK } else { 1 };
+        let leaves = (DVec3::select(forward, high.as_dvec3(), low.as_dvec3()) - from) / step;
+        let side = leaves.min_element();
+        let way = side.max(t).min(end) - t;
+        let density = if skips {
+            DVec4::new(same, 0.0, 0.0, 0.0)
+        } else {
+            density_along(values, &voxels, cell, from + step * t - cell.as_dvec3(), step)
+        };
+        let more = length_along(density, way);
+        if dense + more >= wanted {
+            let way = t + way_along(density, way, wanted - dense) - span.t_begin;
+            return DenseWay { way, dense: wanted, ends: true };
+        }
+        dense += more;
+        t += way;
+        cell = (from + step * t).floor().as_ivec3().clamp(low, high - 1);
+        let axis = if leaves.x == side { 0 } else { 1 + usize::from(leaves.y != side) };
+        cell[axis] = if forward.test(axis) { high[axis] } else { low[axis] - 1 };
+        if cell.cmplt(IVec3::ZERO).any() || cell.cmpge(voxels.count).any() {
+            end = t;
+        }
+    }
+    DenseWay { way: span.t_end - span.t_begin, dense, ends: false }
+}
+
+/// The way from 0 to at most `most` over which the integral of a density becomes `wanted`.
+fn way_along(density: DVec4, most: f64, wanted: f64) -> f64 {
+    let (mut low, mut high) = (0.0, most);
+    let mut s = most * (wanted / length_along(density, most).max(1e-37)).min(1.0);
+    for _ in 0..16 {
+        let excess = length_along(density, s) - wanted;
+        if excess < 0.0 {
+            low = s;
+        } else {
+            high = s;
+        }
+        let here = density.x + s * (density.y + s * (density.z + s * density.w));
+        let mut next = s - excess / here.max(1e-37);
+        if !(next >= low && next <= high) {
+            next = 0.5 * (low + high);
+        }
+        let moved = (next - s).abs();
+        s = next;
+        if moved <= 1e-6 * most {
+            break;
+        }
+    }
+    s
+}
+
+/// The way over which density times length becomes `wanted`, or else all of it.
+pub fn dense_way(values: &[f32], grid: &Grid, span: &Span, wanted: f64) -> DenseWay {
+    if grid.size[0] > 0 {
+        return voxel_way(values, grid, span, wanted);
+    }
+    let (way, dense) = (span.t_end - span.t_begin, height_length(grid, span));
+    if wanted >= dense {
+        return DenseWay { way, dense, ends: false };
+    }
+    let way = height_flight(grid, span.origin, span.direction, span.t_begin, wanted).min(way);
+    DenseWay { way, dense: wanted, ends: true }
+}
+
+/// The density at a point.
+pub fn density_at(values: &[f32], grid: &Grid, point: DVec3) -> f64 {
+    if grid.size[0] == 0 {
+        return height_density(grid, point);
+    }
+    let voxels = dense_voxels(grid);
+    let place = grid_local(grid, point) * DVec3::from_array(grid.size.map(f64::from)) + voxels.shift;
+    let cell = place.floor().as_ivec3().clamp(IVec3::ZERO, voxels.count - 1);
+    let part = (place - cell.as_dvec3()).clamp(DVec3::ZERO, DVec3::ONE);
+    density_along(values, &voxels, cell, part, DVec3::ZERO).x
+}

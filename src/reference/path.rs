@@ -11,7 +11,7 @@ use super::medium::{channel_weights, sample_channel};
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
 use super::path_aim::{Pivot, aimed_pdf, find_aim, find_pivot, is_common, sample_next, weighing_pdf};
 use super::path_flight::{
-    albedo_factor, end_flight, end_height_flight, end_mean_flight, end_voxel_flight, flight_point, flight_side,
+    albedo_factor, end_dense_flight, end_flight, end_mean_flight, end_voxel_flight, flight_point, flight_side,
     free_way, rare_collision_weight, rare_passage_weight,
 };
 use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, power_heuristic, sample_light};
@@ -30,7 +30,7 @@ use super::path_surface::{
 use super::path_vertex::{Vertex, medium_towards, offset_origin, sides_agree, surface_point, to_surface_frame};
 use super::ray::offset_distance;
 use crate::pack::layout::{
-    LIGHT_VOLUME, MEDIUM_HEIGHT, MEDIUM_SEALED, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED,
+    LIGHT_VOLUME, MEDIUM_DENSITY, MEDIUM_SEALED, MEDIUM_VOXELS, PRIMITIVE_BOUNDARY, PRIMITIVE_SPHERE, SURFACE_INVERTED,
     SURFACE_MASK, SURFACE_ORIENTED, SURFACE_PANE, SURFACE_SIDES, SURFACE_SMOOTH, SURFACE_TWO_SIDED,
 };
 use glam::{DVec2, DVec3, UVec2, Vec4Swizzles};
@@ -281,8 +281,8 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
     } else if voxels {
         let shines = emitters_seen(tables, path);
         end_voxel_flight(tables, path, &medium, t, shines)
-    } else if medium.grids & MEDIUM_HEIGHT != 0 {
-        end_height_flight(tables, path, &medium, t)
+    } else if medium.grids & MEDIUM_DENSITY != 0 {
+        end_dense_flight(tables, path, &medium, t)
     } else {
         end_flight(tables, path, &medium, t, surface_hit)
     };

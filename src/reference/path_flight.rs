@@ -3,7 +3,7 @@
 use super::bindings::{Medium, Primitive, Tables};
 use super::equiangular::{equiangular_pdf, sample_equiangular, stretch_seen_from};
 use super::grid::{
-    Rate, Span, grid_local, grid_mean, grid_transmittance, grid_value, height_density, height_flight, height_length,
+    DenseWay, Rate, Span, dense_way, density_at, grid_local, grid_mean, grid_transmittance, grid_value,
     start_grid_walk, stream_numbers, walk_point, walk_to_collision,
 };
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, one_minus_exp_minus, one_minus_exp_minus_rgb};
@@ -13,7 +13,7 @@ use super::path_open::open_factor;
 use super::path_state::{FLIGHT_STREAMS, Hit, NONE, Path, SHADOW_STREAMS, goes_by_lamps, medium_at, open_flight_of};
 use super::ray::{offset_distance, vertex_clearance};
 use super::sampler::set_key;
-use crate::pack::layout::{MEDIUM_ALBEDO_GRID, MEDIUM_EMISSION_GRID, MEDIUM_HEIGHT, MEDIUM_VOXELS, PRIMITIVE_SPHERE};
+use crate::pack::layout::{MEDIUM_ALBEDO_GRID, MEDIUM_DENSITY, MEDIUM_EMISSION_GRID, MEDIUM_VOXELS, PRIMITIVE_SPHERE};
 use glam::DVec3;
 
 /// The end of a flight.
@@ -88,17 +88,14 @@ pub fn end_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64, sur
     end
 }
 
-/// The same in a medium whose density falls with height.
-pub fn end_height_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64) -> FlightEnd {
+/// The same in a medium with a density.
+pub fn end_dense_flight(tables: &Tables, path: &Path, medium: &Medium, t_end: f64) -> FlightEnd {
     let grid = &tables.grids[(medium.grids & 0xff_ffff) as usize - 1];
     let span = Span { origin: path.origin, direction: path.direction, t_begin: path.t_min, t_end };
-    let dense = height_length(grid, &span);
-    let mut end = FlightEnd { scatters: false, way: t_end - path.t_min, weight: medium.albedo, dense };
-    let wanted = free_way(path, medium);
-    if wanted < dense {
-        end.scatters = true;
-        end.way = height_flight(grid, path.origin, path.direction, path.t_min, wanted).min(end.way);
-        let tau = path.tau_rgb + medium.sigma_t * wanted;
+    let DenseWay { way, dense, ends } = dense_way(&tables.values, grid, &span, free_way(path, medium));
+    let mut end = FlightEnd { scatters: ends, way, weight: medium.albedo, dense };
+    if end.scatters {
+        let tau = path.tau_rgb + medium.sigma_t * dense;
         end.weight = scatter_weight(channel_weights(path.throughput), tau, medium.sigma_t, medium.albedo);
     }
     end
@@ -179,7 +176,7 @@ pub fn extinction_at(tables: &Tables, medium: &Medium, point: DVec3) -> [f64; 2]
         let local = grid_local(grid(), point);
         return [sigma * grid_value(&tables.values, grid(), local).x, grid_mean(&tables.values, grid(), local)];
     }
-    [if medium.grids & MEDIUM_HEIGHT != 0 { sigma * height_density(grid(), point) } else { sigma }; 2]
+    [if medium.grids & MEDIUM_DENSITY != 0 { sigma * density_at(&tables.values, grid(), point) } else { sigma }; 2]
 }
 
 /// The albedo's factor at the end of a flight.
@@ -204,8 +201,8 @@ pub fn pass_medium(tables: &Tables, path: &mut Path, t_end: f64, whole: bool) {
         path.tau_mean += mean;
         return;
     }
-    let height = medium.grids & MEDIUM_HEIGHT != 0;
-    let dense = if height { height_length(grid(), &span) } else { t_end - path.t_min };
+    let known = medium.grids & MEDIUM_DENSITY != 0;
+    let dense = if known { dense_way(&tables.values, grid(), &span, f64::INFINITY).dense } else { t_end - path.t_min };
     path.tau_rgb += medium.sigma_t * dense;
     path.tau_mean += medium.sigma_t * dense;
 }

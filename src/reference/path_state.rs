@@ -8,7 +8,7 @@ use super::medium::{channel_weights, free_flight, sample_channel, survival_proba
 use super::path_open::{OpenFlight, open_flight};
 use super::path_share::Record;
 use super::sampler::{group_index, group_seed, half_index, half_seed, lens_key, point_index, set_key, shifted_point};
-use crate::pack::layout::{self, MEDIUM_HEIGHT, MEDIUM_VOXELS};
+use crate::pack::layout::{self, MEDIUM_DENSITY, MEDIUM_VOXELS};
 use crate::pack::sobol::{LENS_SET, SOBOL_SETS};
 use glam::{DVec2, DVec3, DVec4};
 
@@ -224,7 +224,7 @@ pub fn goes_by_lamps(path: &Path, medium: &Medium) -> bool {
 /// Distance to the end of the flight with the extinction that holds from `t_min` on.
 pub fn flight_end(tables: &Tables, path: &Path) -> f64 {
     let medium = medium_at(tables, path.medium);
-    if medium.grids & (MEDIUM_VOXELS | MEDIUM_HEIGHT) != 0 {
+    if medium.grids & (MEDIUM_VOXELS | MEDIUM_DENSITY) != 0 {
         return path.far_end;
     }
     let flight = if path.open {

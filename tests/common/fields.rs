@@ -94,10 +94,20 @@ pub fn smoke_in_a_dark_ball() -> Scene {
 
 /// Gray voxels in a box of their own, over a floor, in the sun; and glowing voxels in a homogeneous medium.
 pub fn smoke() -> Scene {
+    smoke_of([24, 20, 16])
+}
+
+/// The same of so many voxels that light is tracked through them.
+pub fn fine_smoke() -> Scene {
+    smoke_of([24, 600, 16])
+}
+
+fn smoke_of(size: [usize; 3]) -> Scene {
     let mut scene = still_life(false);
     let place = unit_to(v(-1.15, -0.95, -0.8), v(0.9, 0.9, 0.6));
-    let density = grid([24, 20, 16], 1, |x, y, z, _| {
-        let [x, y, z] = [(x as f64 - 11.5) / 12.0, (y as f64 - 9.5) / 10.0, (z as f64 - 7.5) / 8.0];
+    let density = grid(size, 1, |x, y, z, _| {
+        let [x, y, z] = [(x, size[0]), (y, size[1]), (z, size[2])]
+            .map(|(index, count)| (2 * index + 1) as f64 / count as f64 - 1.0);
         (1.0 - x * x - y * y - z * z).max(0.0) * (1.0 + (9.0 * x).sin() * (7.0 * y).cos())
     });
     let mut smoke = Medium::new("smoke", DVec3::splat(3.0), DVec3::splat(0.9), phase(0.3));

@@ -50,6 +50,8 @@ const TOLERANCES: &[Tolerance] = &[
     Tolerance { function: "grid_value", relative: 1e-5, absolute: 2e-3 },
     Tolerance { function: "clip_to_grid", relative: 1e-5, absolute: 2e-5 },
     Tolerance { function: "walk_to_collision", relative: 1e-5, absolute: 2e-4 },
+    Tolerance { function: "dense_way's length", relative: 1e-5, absolute: 2e-5 },
+    Tolerance { function: "dense_way", relative: 1e-5, absolute: 2e-5 },
     Tolerance { function: "height_length", relative: 1e-5, absolute: 2e-38 },
     Tolerance { function: "height_flight", relative: 2e-5, absolute: 2e-6 },
     Tolerance { function: "log_1p", relative: 4e-6, absolute: 0.0 },
