@@ -1,7 +1,8 @@
 // Fields in space: voxels in a box, and a density that falls exponentially with height (see Grid of src/pack/layout.rs). Voxels and
 // cells are read by VALUE(i), which the kernel declares.
 //
-// A ray walks through cells of voxels (Amanatides and Woo 1987), of which each knows bounds of the extinction coefficient. Tentative
+// Through a density (voxels of one number, or one that falls with height) optical depths are known. Through other voxels light is tracked:
+// a ray walks through cells of voxels (Amanatides and Woo 1987), of which each knows bounds of the extinction coefficient. Tentative
 // collisions have the rate of the cell, so that a dense voxel costs where it is and nowhere else (Woodcock et al. 1965; Szirmay-Kalos
 // et al. 2011). Distances are those along the ray; sigma_t is the extinction coefficient where the field is 1, per unit of them.
 #include "lib/math.glsl"

@@ -23,7 +23,7 @@ pub struct Features {
     pub volume_lights: bool,
     /// A medium whose coefficients depend on the place; shadow rays then go from boundary to boundary in order.
     pub grids: bool,
-    /// A medium whose extinction coefficient comes from voxels.
+    /// A medium of voxels through which light is tracked.
     pub voxels: bool,
     /// A medium with a density whose optical depths are known.
     pub densities: bool,

@@ -304,7 +304,8 @@ gpu_struct! {
         /// Index of the first voxel's first number among the values.
         first_value: u32,
         /// Index of the first cell's first number among the values. A cell has four: the largest, the smallest and the mean
-        /// extinction coefficient in it, 1/canonical unit, and the rate of tentative collisions, no less than the first.
+        /// extinction coefficient in it, 1/canonical unit, and the rate of tentative collisions, no less than the first. Of a density,
+        /// `cells_x` and so on count blocks of its cells, which have one number: the value that all voxels there have, or −1.
         first_cell: u32,
         /// Fills the sixteen bytes.
         unused_1: u32,
@@ -558,7 +559,7 @@ pub const GRID_MIRROR: u32 = 2;
 pub const GRID_CLAMP: u32 = 4;
 /// Bit 3: voxels have three numbers.
 pub const GRID_RGB: u32 = 8;
-/// [`Medium::grids`]: voxels are a factor of the extinction coefficient.
+/// [`Medium::grids`]: voxels, through which light is tracked, are a factor of the extinction coefficient.
 pub const MEDIUM_VOXELS: u32 = 1 << 24;
 /// [`Medium::grids`]: a density is a factor of the extinction coefficient whose optical depths are known: voxels of one number, or one that
 /// falls with height.

@@ -118,7 +118,7 @@ fn a_medium_of_voxels_needs_no_shape() {
     assert_eq!((shape.name.as_str(), shape.boundary.unwrap().interior), ("smoke", Some(MediumId(0))));
     assert!((tyndall::pack::nesting::volume(&shape.geometry) - 6.0).abs() < 1e-12, "its normals point outwards");
     let packed = Packed::new(&loaded.scene, 0).unwrap();
-    assert!(packed.features.voxels && packed.features.grids && !packed.features.heights);
+    assert!(packed.features.fields && packed.features.grids && !packed.features.heights);
     // A homogeneous one is nowhere.
     let warnings = with_warnings(r#"<medium type="homogeneous" id="haze"/>"#).warnings;
     assert!(warnings[0].contains("never used"), "{warnings:?}");
@@ -175,5 +175,5 @@ fn the_scenes_of_this_repository_are_read() {
     let other = ("volume".to_owned(), crate::data("volumes/small.vol").display().to_string());
     let smoke = mitsuba::load(&folder.join("smoke.xml"), &[other]).unwrap();
     assert_eq!(smoke.warnings, [""; 0]);
-    assert!(Packed::new(&smoke.scene, 0).unwrap().features.voxels);
+    assert!(Packed::new(&smoke.scene, 0).unwrap().features.fields);
 }
