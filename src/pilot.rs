@@ -49,6 +49,9 @@ pub const MOST_SHARERS: u32 = 8;
 /// Pixels share their paths if the pilot promises at most this much of the variance times time without (measured: it pays where .81 is
 /// promised, and costs more than it brings where .91 is).
 const WORTH_SHARING: f64 = 0.86;
+/// The same where a medium is a density of voxels: first vertices of neighbouring pixels lie apart along the ways through it, and connections
+/// take as long as paths (measured: it pays where .56 is promised, and costs more than it brings where .68 is).
+const WORTH_SHARING_FIELDS: f64 = 0.6;
 
 /// Films with fewer pixels are rendered before a pilot would be.
 const LEAST_PIXELS: usize = 4096;
@@ -138,6 +141,7 @@ pub fn run(packed: &mut Packed, sharing: bool) {
 fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
     let features = &packed.features;
     let rounds = if roulette || features.voxels { PATHS_PER_BLOCK } else { FEW_PATHS_PER_BLOCK };
+    let worth = if features.fields { WORTH_SHARING_FIELDS } else { WORTH_SHARING };
     let mut tables = Tables::new(packed);
     tables.params.seed = SEED;
     let params = &packed.params;
@@ -145,11 +149,11 @@ fn look_ahead(packed: &mut Packed, sharing: bool, roulette: bool) {
     let blocks = Blocks { side, columns: params.crop_width.div_ceil(side), rows: params.crop_height.div_ceil(side) };
     let mut trails = follow(&tables, blocks, 0..rounds);
     let Some(mut view) = View::of(&trails, blocks) else { return };
-    if sharing && features.lobes() && view.best_sharers() > 0 {
+    if sharing && features.lobes() && view.best_sharers(worth) > 0 {
         trails.extend(follow(&tables, blocks, rounds..MANY_PATHS_PER_BLOCK));
         view = View::of(&trails, blocks).unwrap_or(view);
     }
-    packed.features.sharers = if sharing { view.best_sharers() } else { 0 };
+    packed.features.sharers = if sharing { view.best_sharers(worth) } else { 0 };
     if roulette && let Some(found) = Found::of(&trails, &view, packed.features.sharers) {
         found.add_to(packed, blocks);
     }
@@ -309,15 +313,15 @@ impl View {
         self.direct / DIRECT_STRATIFIED + self.lonely + self.shared * noise / alike(sharers)
     }
 
-    /// Pixels of the groups that bring the least variance times time; 0 if that is hardly less than without.
-    fn best_sharers(&self) -> u32 {
+    /// Pixels of the groups that bring the least variance times time; 0 if that is more than `worth` times what it is without.
+    fn best_sharers(&self, worth: f64) -> u32 {
         let time = |sharers: u32| match sharers {
             0 => 1.0,
             _ => 1.0 + SHARE_COST + self.connections(sharers),
         };
         let cost = |sharers: u32| self.variance_with(sharers) * time(sharers);
         let best = if cost(4) < cost(MOST_SHARERS) { 4 } else { MOST_SHARERS };
-        if cost(best) < WORTH_SHARING * cost(0) { best } else { 0 }
+        if cost(best) < worth * cost(0) { best } else { 0 }
     }
 }
 
