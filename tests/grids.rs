@@ -31,8 +31,13 @@ fn packed(mut volume: Volume, sigma_t: DVec3) -> Packed {
 
 /// A scene with a medium whose density is a field, in a box that does not matter.
 fn packed_density(volume: Volume, sigma_t: DVec3) -> Packed {
+    packed_glow(volume, sigma_t, DVec3::ZERO)
+}
+
+/// The same, of a medium that emits.
+fn packed_glow(volume: Volume, sigma_t: DVec3, emission: DVec3) -> Packed {
     let mut scene = Scene::new(Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, 40.0), Film::new(8, 8));
-    let mut medium = Medium::new("field", sigma_t, DVec3::ONE, Phase::Isotropic);
+    let mut medium = Medium { emission, ..Medium::new("field", sigma_t, DVec3::ONE, Phase::Isotropic) };
     medium.volumes.sigma_t = Some(volume);
     let id = scene.add_medium(medium);
     scene.shapes.push(Shape::boundary("box", scenes::cuboid(DMat4::IDENTITY), id));
@@ -260,13 +265,8 @@ fn fog_that_thins_out_agrees_with_the_reference_and_with_quadrature() {
 fn densities_are_those_that_are_worth_their_cells() {
     let is_density = |size: [usize; 3], sigma_t: f64, emission: f64| {
         let voxels = grid(size, 1, |x, y, z, _| ((x + 2 * y + 3 * z) % 5) as f64 / 5.0);
-        let mut scene = Scene::new(Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, 40.0), Film::new(8, 8));
-        let mut medium = Medium::new("field", DVec3::splat(sigma_t), DVec3::ONE, Phase::Isotropic);
-        medium.emission = DVec3::splat(emission);
-        medium.volumes.sigma_t = Some(Volume::Grid(field(voxels, DMat4::IDENTITY)));
-        let id = scene.add_medium(medium);
-        scene.shapes.push(Shape::boundary("box", scenes::cuboid(DMat4::IDENTITY), id));
-        let packed = scenes::pack(&scene, 1);
+        let volume = Volume::Grid(field(voxels, DMat4::IDENTITY));
+        let packed = packed_glow(volume, DVec3::splat(sigma_t), DVec3::splat(emission));
         let found = packed.media[1].grids & (MEDIUM_DENSITY | MEDIUM_VOXELS);
         assert_eq!((packed.features.fields, packed.features.voxels), (found == MEDIUM_DENSITY, found == MEDIUM_VOXELS));
         found == MEDIUM_DENSITY

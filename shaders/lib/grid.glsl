@@ -49,6 +49,16 @@ vec3 grid_local(Grid grid, vec3 point) {
     return vec3(dot(grid.row_x, point) + grid.shift_x, dot(grid.row_y, point) + grid.shift_y, dot(grid.row_z, point) + grid.shift_z);
 }
 
+// A direction in the unit cube of the voxels.
+vec3 grid_direction(Grid grid, vec3 direction) {
+    return vec3(dot(grid.row_x, direction), dot(grid.row_y, direction), dot(grid.row_z, direction));
+}
+
+// What can be divided by.
+vec3 away_from_zero(vec3 step) {
+    return mix(step, vec3(1e-20), lessThan(abs(step), vec3(1e-20)));
+}
+
 // The field at a point of the unit cube: the voxel in which it lies, or trilinear interpolation of the eight nearest centres, which
 // lie at ((x + 1/2)/size_x, ...).
 vec3 grid_value(Grid grid, vec3 local) {
@@ -77,8 +87,7 @@ vec3 grid_value(Grid grid, vec3 local) {
 // Where a ray is in the unit cube, (enters, leaves) between two distances; it is nowhere where it leaves before it enters.
 vec2 clip_to_grid(Grid grid, vec3 origin, vec3 direction, float t_begin, float t_end) {
     vec3 from = grid_local(grid, origin);
-    vec3 step = vec3(dot(grid.row_x, direction), dot(grid.row_y, direction), dot(grid.row_z, direction));
-    vec3 inverse = 1.0 / mix(step, vec3(1e-20), lessThan(abs(step), vec3(1e-20)));
+    vec3 inverse = 1.0 / away_from_zero(grid_direction(grid, direction));
     vec3 low = -from * inverse, high = (1.0 - from) * inverse;
     vec3 near = min(low, high), far = max(low, high);
     return vec2(max(max(near.x, near.y), max(near.z, t_begin)), min(min(far.x, far.y), min(far.z, t_end)));
@@ -102,8 +111,7 @@ GridWalk start_grid_walk(Grid grid, vec3 origin, vec3 direction, float t_begin, 
     vec2 clipped = clip_to_grid(grid, origin, direction, t_begin, t_end);
     GridWalk walk;
     walk.origin = grid_local(grid, origin) * cells;
-    vec3 step = vec3(dot(grid.row_x, direction), dot(grid.row_y, direction), dot(grid.row_z, direction)) * cells;
-    walk.direction = mix(step, vec3(1e-20), lessThan(abs(step), vec3(1e-20)));
+    walk.direction = away_from_zero(grid_direction(grid, direction) * cells);
     walk.t = clipped.x;
     walk.end = clipped.y;
     walk.cell = ivec3(clamp(floor(walk.origin + walk.direction * min(walk.t, walk.end)), vec3(0.0), cells - 1.0));
@@ -273,8 +281,7 @@ DenseWay voxel_way(Grid grid, vec3 origin, vec3 direction, float t_begin, float 
     DenseVoxels voxels = dense_voxels(grid);
     vec3 size = vec3(grid.size_x, grid.size_y, grid.size_z);
     vec3 from = grid_local(grid, origin) * size + voxels.shift;
-    vec3 step = vec3(dot(grid.row_x, direction), dot(grid.row_y, direction), dot(grid.row_z, direction)) * size;
-    step = mix(step, vec3(1e-20), lessThan(abs(step), vec3(1e-20)));
+    vec3 step = away_from_zero(grid_direction(grid, direction) * size);
     vec3 inverse = 1.0 / step;
     bvec3 forward = greaterThan(step, vec3(0.0));
     float t = clipped.x, end = clipped.y, dense = 0.0, way = 0.0;
@@ -386,9 +393,14 @@ float height_flight(Grid grid, vec3 origin, vec3 direction, float t_begin, float
     return above + max(wanted - length_above(0.0, steep, above), 0.0);
 }
 
+// Whether a density is one of voxels.
+bool is_field(Grid grid) {
+    return HAS_FIELDS && (!HAS_HEIGHTS || grid.size_x > 0u);
+}
+
 // The way over which density times length becomes `wanted`, or else all of it.
 DenseWay dense_way(Grid grid, vec3 origin, vec3 direction, float t_begin, float t_end, float wanted) {
-    if (HAS_FIELDS && (!HAS_HEIGHTS || grid.size_x > 0u)) {
+    if (is_field(grid)) {
         return voxel_way(grid, origin, direction, t_begin, t_end, wanted);
     }
     float dense = height_length(grid, origin, direction, t_begin, t_end), way = t_end - t_begin;
@@ -400,7 +412,7 @@ DenseWay dense_way(Grid grid, vec3 origin, vec3 direction, float t_begin, float 
 }
 
 float density_at(Grid grid, vec3 point) {
-    if (HAS_FIELDS && (!HAS_HEIGHTS || grid.size_x > 0u)) {
+    if (is_field(grid)) {
         DenseVoxels voxels = dense_voxels(grid);
         vec3 place = grid_local(grid, point) * vec3(grid.size_x, grid.size_y, grid.size_z) + voxels.shift;
         ivec3 cell = clamp(ivec3(floor(place)), ivec3(0), voxels.count - 1);
