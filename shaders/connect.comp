@@ -36,7 +36,8 @@ void main() {
     Hit hit;
     Ray ray;
     GridRay grid;
-    Walk walk = Walk(0u, 0u, 0u);
+    Walk walk;
+    end_walk(walk);
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {
             DenseWay through = DenseWay(0.0, 0.0, false);
@@ -107,7 +108,7 @@ void main() {
                 }
                 if (!HAS_CHROMATIC && !HAS_GRIDS && to == own) {
                     // The path has been there.
-                    walk = Walk(0u, 0u, 0u);
+                    end_walk(walk);
                     hit.blocked = false;
                     hit.tau = SAMPLE(record + BASE).w;
                     hit.first = HAS_EQUIANGULAR ? SAMPLE(record + RECORD_WEIGHT).w : INFINITE_DISTANCE;

@@ -40,7 +40,8 @@ void main() {
     Hit hit;
     Ray ray;
     GridRay grid;
-    Walk walk = Walk(0u, 0u, 0u);
+    Walk walk;
+    end_walk(walk);
     bool fresh = true; // the invocation has no path yet
     [[dont_unroll]] while (true) {
         if (walk_rays(path, ray, grid, walk, hit)) {

@@ -114,13 +114,13 @@ fn glsl_name(inner: &TypeInner) -> &'static str {
     }
 }
 
-/// The features of the scenes, each as needed and with everything on, and a tree too large for eight copies.
+/// The features of the scenes, each as needed and with everything on, and a deep tree.
 fn features() -> Vec<Features> {
     let mut features: Vec<Features> = Vec::new();
     for (_, scene) in scenes::all() {
         let needed = scenes::pack(&scene, 1).features;
         let sharing = [4, 8].map(|sharers| Features { sharers, grids: false, masks: false, ..needed });
-        features.extend([needed, needed.everything(), Features { node_copies: 1, ..needed }]);
+        features.extend([needed, needed.everything(), Features { tree_depth: 12, ..needed }]);
         features.extend(sharing);
     }
     features
@@ -228,12 +228,8 @@ fn both_forms_of_a_kernel_render_the_same_image() {
         let packed = scenes::pack(&scene, 3);
         let mut forms = vec![packed.clone()];
         if name == "gray box" {
-            // A tree too large for eight copies.
-            let mut single = packed;
-            single.bvh.nodes.truncate(single.bvh.node_count as usize);
-            single.bvh.copies = 1;
-            single.features.node_copies = 1;
-            forms.push(single);
+            // All of it in the tree.
+            forms.push(packed.with_immediates(0));
         }
         for packed in &forms {
             let features = packed.features;

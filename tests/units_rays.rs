@@ -145,7 +145,7 @@ impl Walks {
     }
 
     fn run(&self) -> Vec<[f32; 4]> {
-        let features = Features { node_copies: self.packed.bvh.copies, ..variant().features };
+        let features = Features { tree_depth: self.packed.bvh.depth, ..variant().features };
         let rays = self.rays.iter();
         let inputs: Vec<[f32; 4]> =
             rays.flat_map(|[o, d]| [vec4(&[o.x, o.y, o.z, 100.0]), vec4(&d.to_array())]).collect();
@@ -206,18 +206,42 @@ fn walks_find_the_nearest_triangle_and_never_leak() {
     }
 }
 
+/// Triangles that shrink towards a point, as far as the bounds' grid tells them apart: a deep tree.
+fn shrinking() -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut random = Random(11);
+    for k in 0..400u32 {
+        let size = 0.98_f64.powi(k as i32);
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([0; 3].map(|_| DVec3::splat(size) + random.in_cube() * 0.3 * size));
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    mesh
+}
+
 #[test]
-fn the_tree_misses_nothing_in_either_layout() {
-    let walks = Walks::new(scenes::icosphere(2), 8);
-    assert_eq!(walks.packed.bvh.copies, 8);
-    let eight = walks.run();
-    // The first of the eight copies alone, which the kernel turns by the ray's direction.
-    let mut single = walks;
-    single.packed.bvh.nodes.truncate(single.packed.bvh.node_count as usize);
-    single.packed.bvh.copies = 1;
-    let one = single.run();
-    for (a, b) in eight.iter().zip(&one) {
-        assert_eq!((a[0], a[2], a[3]), (b[0], b[2], b[3]));
+fn the_tree_misses_nothing() {
+    for (name, mesh) in [("icosphere", scenes::icosphere(2)), ("shrinking triangles", shrinking())] {
+        let mut walks = Walks::new(mesh, 8);
+        let outputs = walks.run();
+        let crossings: f32 = outputs.iter().map(|output| output[2]).sum();
+        assert!(crossings > 1000.0, "{name}: {crossings} crossings prove little");
+        // The same where all bounds are as wide as can be: every ray tries every triangle.
+        let bounds = walks.packed.bvh.nodes.clone();
+        for node in &mut walks.packed.bvh.nodes {
+            *node = [0, 0, 0, !0, !0, !0, 0, 0x0fff_0000, node[8], node[9]];
+        }
+        let exhaustive = walks.run();
+        let differ = |others: &[[f32; 4]]| {
+            let pairs = exhaustive.iter().zip(others);
+            pairs.filter(|(a, b)| (a[0], a[2], a[3]) != (b[0], b[2], b[3])).count()
+        };
+        assert_eq!(differ(&outputs), 0, "{name}: rays that the tree answers otherwise");
+        // One step less on one side of one node is seen.
+        walks.packed.bvh.nodes = bounds;
+        let root = &mut walks.packed.bvh.nodes[0];
+        root[3] = (root[3] & !0xff) | (root[3] & 0xff) / 2;
+        assert!(differ(&walks.run()) > 0, "{name}: a bound that cuts off a part goes unseen");
     }
     // Without a hole there is no leak, with one there is: the counter is not blind.
     let mut open = scenes::icosphere(3);

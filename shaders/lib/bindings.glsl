@@ -8,7 +8,7 @@
 #ifdef USE_BUFFER_REFERENCE
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer NodesAddress { u64vec2 at[]; };
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer NodesAddress { uint64_t at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PrimitivesAddress { u64vec2 at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer SurfacesAddress { Surface at[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MediaAddress { Medium at[]; };
@@ -44,7 +44,7 @@ Primitive load_primitive(uint i) {
     uvec4 c = load_words(push.primitives.at[3u * i + 2u]);
     return Primitive(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), uintBitsToFloat(c.w));
 }
-#define NODE(i) load_words(push.nodes.at[i])
+#define NODE_WORDS(i) unpack32(push.nodes.at[i])
 #define PRIMITIVE(i) load_primitive(i)
 #define SURFACE(i) push.surfaces.at[i]
 #define MEDIUM(i) push.media.at[i]
@@ -62,7 +62,7 @@ void store_sample(uint i, vec4 v) {
     SampleWordsAddress(push.samples).at[i] = u64vec2(pack64(bits.xy), pack64(bits.zw));
 }
 #else
-layout(set = 0, binding = 0, std430) readonly buffer Nodes { uvec4 nodes[]; };
+layout(set = 0, binding = 0, std430) readonly buffer Nodes { uvec2 nodes[]; };
 layout(set = 0, binding = 1, std430) readonly buffer Primitives { Primitive primitives[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Surfaces { Surface surfaces[]; };
 layout(set = 0, binding = 3, std430) readonly buffer Media { Medium media[]; };
@@ -78,7 +78,7 @@ layout(push_constant) uniform Push {
     uvec4 addresses[6];
     Dispatch work;
 } push;
-#define NODE(i) nodes[i]
+#define NODE_WORDS(i) nodes[i]
 #define PRIMITIVE(i) primitives[i]
 #define SURFACE(i) surfaces[i]
 #define MEDIUM(i) media[i]

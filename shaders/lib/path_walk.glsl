@@ -4,19 +4,23 @@
 #include "lib/path_rays.glsl"
 #include "lib/bvh.glsl"
 
-const uint NODE_STEPS = 8u;
+const uint NODE_STEPS = 2u;
 
-void begin_ray(Path path, out Ray ray, out GridRay grid, out Walk walk, out Hit hit) {
+Node load_node(uint index) {
+    uint at = 5u * index;
+    return unpack_node(NODE_WORDS(at), NODE_WORDS(at + 1u), NODE_WORDS(at + 2u), NODE_WORDS(at + 3u), NODE_WORDS(at + 4u));
+}
+
+void begin_ray(Path path, out Ray ray, inout GridRay grid, inout Walk walk, out Hit hit) {
     hit = begin_hit(path);
     ray.origin = path.origin;
     ray.direction = path.direction;
     orthonormal_frame(ray.direction, ray.tangent, ray.bitangent);
     test_immediates(path, ray, hit);
-    walk = Walk(0u, 0u, 0u);
-    if (HAS_TREE) {
+    end_walk(walk);
+    if (HAS_TREE && !hit.blocked) {
         grid = grid_ray(path.origin, path.direction, params.grid_origin, params.grid_step);
-        walk = start_walk(grid, params.node_count, NODE_COPIES);
-        walk.node = hit.blocked ? walk.end : walk.node;
+        start_walk(grid, params.tree_size, hit.t, walk);
     }
 }
 
@@ -25,18 +29,18 @@ bool walk_rays(Path path, Ray ray, GridRay grid, inout Walk walk, inout Hit hit)
     bool busy;
     if (HAS_TREE) [[dont_unroll]] do {
         [[dont_unroll]] for (uint k = 0u; k < NODE_STEPS; ++k) {
-            if (walk.node < walk.end && walk.leaf == 0u) {
-                step_walk(NODE(walk.node), grid, hit.t, NODE_COPIES, walk);
+            if (walk.node != NO_NODE && walk.pending == 0u) {
+                step_walk(load_node(walk.node), grid, hit.t, walk);
             }
         }
-        if (walk.leaf != 0u) {
+        if (walk.pending != 0u) {
             uint index = next_primitive(walk);
             test_primitive(path, ray, index, PRIMITIVE(index), hit);
             if (hit.blocked) {
-                walk = Walk(walk.end, walk.end, 0u);
+                end_walk(walk);
             }
         }
-        busy = walk.node < walk.end || walk.leaf != 0u;
+        busy = !is_done(walk);
     } while (subgroupAdd(busy ? 1u : 0u) > gl_SubgroupSize / 2u);
-    return walk.node >= walk.end && walk.leaf == 0u;
+    return is_done(walk);
 }

@@ -10,10 +10,15 @@
 
 layout(local_size_x = WORKGROUP) in;
 layout(set = 0, binding = 0, std430) readonly buffer Inputs { vec4 inputs[]; };
-layout(set = 0, binding = 1, std430) readonly buffer Nodes { uvec4 nodes[]; };
+layout(set = 0, binding = 1, std430) readonly buffer Nodes { uvec2 nodes[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Primitives { Primitive primitives[]; };
 layout(set = 0, binding = 3, std430) readonly buffer ParamsBuffer { Params params; };
 layout(set = 0, binding = 4, std430) buffer Outputs { vec4 outputs[]; };
+
+Node load_node(uint index) {
+    uint at = 5u * index;
+    return unpack_node(nodes[at], nodes[at + 1u], nodes[at + 2u], nodes[at + 3u], nodes[at + 4u]);
+}
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -29,10 +34,11 @@ void main() {
     // The nearest: the walk's end comes nearer with each hit.
     float nearest = inputs[2u * i].w;
     uint index = NONE;
-    Walk walk = start_walk(grid, params.node_count, NODE_COPIES);
-    [[dont_unroll]] while (walk.node < walk.end || walk.leaf != 0u) {
-        if (walk.leaf == 0u) {
-            step_walk(nodes[walk.node], grid, nearest, NODE_COPIES, walk);
+    Walk walk;
+    start_walk(grid, params.tree_size, nearest, walk);
+    [[dont_unroll]] while (!is_done(walk)) {
+        if (walk.pending == 0u) {
+            step_walk(load_node(walk.node), grid, nearest, walk);
         } else {
             uint candidate = next_primitive(walk);
             Primitive primitive = primitives[candidate];
@@ -45,10 +51,10 @@ void main() {
     }
     // All of them.
     float crossings = 0.0, outwards = 0.0;
-    walk = start_walk(grid, params.node_count, NODE_COPIES);
-    [[dont_unroll]] while (walk.node < walk.end || walk.leaf != 0u) {
-        if (walk.leaf == 0u) {
-            step_walk(nodes[walk.node], grid, inputs[2u * i].w, NODE_COPIES, walk);
+    start_walk(grid, params.tree_size, inputs[2u * i].w, walk);
+    [[dont_unroll]] while (!is_done(walk)) {
+        if (walk.pending == 0u) {
+            step_walk(load_node(walk.node), grid, inputs[2u * i].w, walk);
         } else {
             Primitive primitive = primitives[next_primitive(walk)];
             TriangleHit hit = intersect_triangle(ray, primitive.a, primitive.b, primitive.c);

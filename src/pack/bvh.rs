@@ -1,44 +1,54 @@
-//! The flattened bounding volume hierarchy: 16-byte nodes in depth-first order, walked without a stack.
+//! The flattened bounding volume hierarchy: nodes of up to four children, walked with a short stack in registers.
 //!
-//! A node is hit or not: if it is, or if it is a leaf, the walk goes on with the next node; if an inner node is missed, with
-//! the node behind its subtree. Bounds are 16-bit steps of a grid over the whole tree. With eight copies of the tree,
-//! one for each octant of directions, children stand near one first and each bound stands where the ray enters it.
+//! A step of a walk tests all children of a node, takes the nearest of the inner ones that are hit, leaves the others on the stack and has
+//! the primitives of the leaves among them tested. Steps wait for the loads of nodes, so that one load should answer as much as it can;
+//! hence the bounds of children are bytes, in a grid of the node's own.
 //!
-//! Layout of a node, `[u32; 4]`: for x, y, z the near bound (low 16 bits) and the far bound (high 16 bits), then a word: of an
-//! inner node the index of the node behind its subtree; of a leaf bit 31, the first primitive (<< 3) and the number of
-//! primitives minus 1.
+//! Layout of a node, `[u32; 10]`: the lower bounds of the four children in x, y and z (child 0 in the lowest byte), the upper ones; the origin
+//! of the node's grid in steps of the tree's (x and y, 16 bits each; z in 16 bits, then the binary logarithms of its own steps in those of the
+//! tree, 4 bits for each axis); the index of its first inner child (26 bits) with the kinds of the children 0 and 1 (3 bits each); its first
+//! primitive (26 bits) with those of the children 2 and 3. The inner children come first and are contiguous, and so are the primitives of
+//! the leaves. A kind is 0: no child, 1 to 6: a leaf with so many primitives, 7: an inner node.
+//!
+//! The nodes with more than two children, bytes as bounds and primitives in a row are those of Ylitie, Karras and Laine (2017), "Efficient
+//! incoherent ray traversal on GPUs through compressed wide BVHs".
 
 use super::layout::{PRIMITIVE_SPHERE, Primitive};
-use glam::{Vec3, Vec3A};
+use glam::{UVec3, Vec3};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
-/// Most primitives in a leaf: the count has three bits.
-const MAX_LEAF: u32 = 8;
-/// Eight copies of the tree are made as long as they take no more than this, in bytes: they must stay in a processor's own
-/// caches. Beyond, a single copy costs 3 % more steps but a third less time (measured on 20,480 triangles).
-const MAX_COPIES_SIZE: usize = 128 << 10;
-/// Bits of a leaf's first primitive.
-const FIRST_BITS: u32 = 28;
-/// Most primitives that a tree can hold.
-pub const MAX_PRIMITIVES: usize = 1 << FIRST_BITS;
-const LEAF: u32 = 1 << 31;
+/// Most primitives in a leaf.
+const MAX_LEAF: u32 = 6;
+/// Kind of a child that is a node.
+const INNER: u32 = 7;
+/// Most children of a node.
+const WIDTH: usize = 4;
+/// Bits of a kind.
+const KIND_BITS: u32 = 3;
+/// Bits of the kinds that share a word with an index.
+const KINDS_BITS: u32 = 2 * KIND_BITS;
+/// Most primitives that a tree can hold, and more than it has nodes.
+pub const MAX_PRIMITIVES: usize = 1 << (32 - KINDS_BITS);
+
+/// A node: see the head of this file.
+pub type Node = [u32; 10];
 
 /// A flattened tree. The primitives of its leaves are contiguous in the order that [`Bvh::new`] returns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bvh {
-    /// All copies, one behind the other.
-    pub nodes: Vec<[u32; 4]>,
-    /// Nodes of one copy.
-    pub node_count: u32,
-    /// 8, or 1 for a large tree. A single copy has the order of the octant (+, +, +).
-    pub copies: u32,
+    /// The root, then the children of each node together.
+    pub nodes: Vec<Node>,
+    /// Levels of nodes below the root: what a walk may have to keep on its stack.
+    pub depth: u32,
     /// Lower corner of the grid.
     pub grid_origin: Vec3,
     /// Step of the grid.
     pub grid_step: Vec3,
+    /// The corner opposite to `grid_origin`, in steps.
+    pub size: Vec3,
 }
 
 struct Bounded(Aabb);
@@ -89,41 +99,21 @@ impl Bvh {
             .collect();
         let config = BvhBuildParams {
             max_prims_per_leaf: MAX_LEAF,
-            collapse_traversal_cost: 1.0,
+            collapse_traversal_cost: 0.6,
             ..BvhBuildParams::medium_build()
         };
         let tree = build_bvh2(&boxes, config, &mut Default::default());
         let grid = Grid::new(&tree, whole);
-        let mut order = Vec::with_capacity(primitives.len());
-        let mut leaf_starts = vec![0u32; tree.nodes.len()];
-        number_leaves(&tree, first, &mut order, &mut leaf_starts);
-
-        let node_count = count_nodes(&tree);
-        let copies = if node_count * 16 * 8 <= MAX_COPIES_SIZE { 8 } else { 1 };
-        let mut nodes = Vec::with_capacity(node_count * copies);
-        for octant in 0..copies {
-            flatten(&tree, &grid, &leaf_starts, octant as u32, &mut nodes);
-        }
-        let bvh = Bvh {
-            nodes,
-            node_count: node_count as u32,
-            copies: copies as u32,
-            grid_origin: grid.origin,
-            grid_step: grid.step,
-        };
-        (bvh, order)
+        let mut flattened = Flattened { tree: &tree, grid: &grid, nodes: Vec::new(), order: Vec::new(), depth: 0 };
+        flattened.build(first);
+        let Flattened { nodes, order, depth, .. } = flattened;
+        let size = grid.quantize(&tree.nodes[0].aabb).1.as_vec3();
+        (Bvh { nodes, depth, grid_origin: grid.origin, grid_step: grid.step, size }, order)
     }
 
-    /// A tree that no ray hits.
+    /// A tree that no ray hits: its root has no children.
     fn empty() -> Bvh {
-        // For each octant an inner node whose near bounds lie behind its far bounds, and whose link leads behind it.
-        Bvh {
-            nodes: (1..=8).map(|end| [0xffff, 0xffff, 0xffff, end]).collect(),
-            node_count: 1,
-            copies: 8,
-            grid_origin: Vec3::ZERO,
-            grid_step: Vec3::ONE,
-        }
+        Bvh { nodes: vec![[0; 10]], depth: 0, grid_origin: Vec3::ZERO, grid_step: Vec3::ONE, size: Vec3::ZERO }
     }
 }
 
@@ -147,78 +137,84 @@ impl Grid {
         Grid { origin: min - step * (MARGIN + 1.0), step }
     }
 
-    fn quantize(&self, aabb: &Aabb) -> [(u32, u32); 3] {
+    fn quantize(&self, aabb: &Aabb) -> (UVec3, UVec3) {
         let low = ((Vec3::from(aabb.min) - self.origin) / self.step - MARGIN).floor();
         let high = ((Vec3::from(aabb.max) - self.origin) / self.step + MARGIN).ceil();
-        [0, 1, 2].map(|axis| (low[axis].clamp(0.0, 65535.0) as u32, high[axis].clamp(0.0, 65535.0) as u32))
+        let most = Vec3::splat(65535.0);
+        (low.clamp(Vec3::ZERO, most).as_uvec3(), high.clamp(Vec3::ZERO, most).as_uvec3())
     }
 }
 
-/// Calls `visit` for each node that the root reaches, parents first, the first child's subtree before the second's.
-fn depth_first(tree: &Bvh2, mut visit: impl FnMut(usize)) {
-    let mut stack = vec![0usize];
-    while let Some(index) = stack.pop() {
-        visit(index);
-        let node = &tree.nodes[index];
-        if !node.is_leaf() {
-            stack.extend([node.first_index as usize + 1, node.first_index as usize]);
-        }
-    }
+/// A tree as it is made from one of nodes of two.
+struct Flattened<'a> {
+    tree: &'a Bvh2,
+    grid: &'a Grid,
+    nodes: Vec<Node>,
+    order: Vec<u32>,
+    depth: u32,
 }
 
-fn number_leaves(tree: &Bvh2, first_of_all: u32, order: &mut Vec<u32>, starts: &mut [u32]) {
-    depth_first(tree, |index| {
-        let node = &tree.nodes[index];
-        if node.is_leaf() {
-            starts[index] = first_of_all + order.len() as u32;
-            let first = node.first_index as usize;
-            order.extend(&tree.primitive_indices[first..first + node.prim_count as usize]);
-        }
-    });
-}
-
-fn count_nodes(tree: &Bvh2) -> usize {
-    let mut count = 0;
-    depth_first(tree, |_| count += 1);
-    count
-}
-
-/// Appends one copy of the tree. Skip links are relative to the start of all copies.
-fn flatten(tree: &Bvh2, grid: &Grid, leaf_starts: &[u32], octant: u32, nodes: &mut Vec<[u32; 4]>) {
-    enum Step {
-        Enter(usize),
-        /// The subtree of the flattened node is complete.
-        Close(usize),
-    }
-    let negative = |axis: usize| octant >> axis & 1 == 1;
-    let toward = Vec3A::new(
-        if negative(0) { -1.0 } else { 1.0 },
-        if negative(1) { -1.0 } else { 1.0 },
-        if negative(2) { -1.0 } else { 1.0 },
-    );
-    let mut stack = vec![Step::Enter(0)];
-    while let Some(step) = stack.pop() {
-        let index = match step {
-            Step::Close(flat) => {
-                nodes[flat][3] = nodes.len() as u32;
-                continue;
+impl Flattened<'_> {
+    fn build(&mut self, first: u32) {
+        self.nodes.push([0; 10]);
+        // A node that is to be written, the node of two that it comes from, and its depth.
+        let mut stack = vec![(0usize, 0usize, 0u32)];
+        while let Some((place, root, depth)) = stack.pop() {
+            self.depth = self.depth.max(depth);
+            let children = self.children(root);
+            let first_inner = self.nodes.len();
+            let first_primitive = first + self.order.len() as u32;
+            let mut kinds = [0; WIDTH];
+            for (kind, &child) in kinds.iter_mut().zip(&children) {
+                let node = &self.tree.nodes[child];
+                if node.is_leaf() {
+                    *kind = node.prim_count;
+                    let primitives = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+                    self.order.extend(&self.tree.primitive_indices[primitives]);
+                } else {
+                    *kind = INNER;
+                    stack.push((self.nodes.len(), child, depth + 1));
+                    self.nodes.push([0; 10]);
+                }
             }
-            Step::Enter(index) => index,
-        };
-        let node = &tree.nodes[index];
-        let bounds = grid.quantize(&node.aabb);
-        let word = |axis: usize| {
-            let (low, high) = bounds[axis];
-            if negative(axis) { high | low << 16 } else { low | high << 16 }
-        };
-        let link = if node.is_leaf() { LEAF | leaf_starts[index] << 3 | (node.prim_count - 1) } else { 0 };
-        nodes.push([word(0), word(1), word(2), link]);
-        if !node.is_leaf() {
-            let left = node.first_index as usize;
-            let center = |child: usize| tree.nodes[child].aabb.center();
-            let left_first = toward.dot(center(left + 1) - center(left)) >= 0.0;
-            let (near, far) = if left_first { (left, left + 1) } else { (left + 1, left) };
-            stack.extend([Step::Close(nodes.len() - 1), Step::Enter(far), Step::Enter(near)]);
+            self.nodes[place] = self.pack(&children, kinds, first_inner as u32, first_primitive);
         }
+    }
+
+    /// Up to four nodes that together hold what a node holds, inner ones first: of what is there, the node with the largest surface is
+    /// opened as long as there is room. A root that is a leaf is its own child.
+    fn children(&self, root: usize) -> Vec<usize> {
+        let mut children = vec![root];
+        while children.len() < WIDTH {
+            let inner = (0..children.len()).filter(|&k| !self.tree.nodes[children[k]].is_leaf());
+            let area = |k: &usize| self.tree.nodes[children[*k]].aabb.half_area();
+            let Some(largest) = inner.max_by(|one, two| area(one).total_cmp(&area(two))) else { break };
+            let left = self.tree.nodes[children.swap_remove(largest)].first_index as usize;
+            children.extend([left, left + 1]);
+        }
+        children.sort_by_key(|&child| self.tree.nodes[child].is_leaf());
+        children
+    }
+
+    fn pack(&self, children: &[usize], kinds: [u32; WIDTH], first_inner: u32, first_primitive: u32) -> Node {
+        let bounds: Vec<_> = children.iter().map(|&child| self.grid.quantize(&self.tree.nodes[child].aabb)).collect();
+        let origin = bounds.iter().fold(UVec3::MAX, |least, (low, _)| least.min(*low));
+        let end = bounds.iter().fold(UVec3::ZERO, |most, (_, high)| most.max(*high));
+        // The least shift with which the extent fits into a byte, rounded up.
+        let shift =
+            (end - origin).to_array().map(|extent| (0..).find(|&k| extent.div_ceil(1 << k) <= 255).unwrap_or(0));
+        let mut node = [0; 10];
+        for (slot, (low, high)) in bounds.iter().enumerate() {
+            for axis in 0..3 {
+                let step = 1u32 << shift[axis];
+                node[axis] |= ((low[axis] - origin[axis]) / step) << (8 * slot);
+                node[3 + axis] |= (high[axis] - origin[axis]).div_ceil(step) << (8 * slot);
+            }
+        }
+        node[6] = origin.x | origin.y << 16;
+        node[7] = origin.z | shift[0] << 16 | shift[1] << 20 | shift[2] << 24;
+        node[8] = first_inner << KINDS_BITS | kinds[1] << KIND_BITS | kinds[0];
+        node[9] = first_primitive << KINDS_BITS | kinds[3] << KIND_BITS | kinds[2];
+        node
     }
 }

@@ -118,8 +118,8 @@ pub struct Features {
     pub sharers: u32,
     /// The light of lamps that the camera sees is found apart, for some pixels ([`crate::seen`]).
     pub seen: bool,
-    /// Copies of the tree: 8 or 1.
-    pub node_copies: u32,
+    /// Levels of nodes below the root of the tree.
+    pub tree_depth: u32,
     /// Primitives in the tree; without, all stand in the kernel.
     pub tree: bool,
 }
@@ -224,7 +224,7 @@ impl Features {
             sharers: 0,
             seen: false,
             sealed: packed.media.iter().any(|medium| medium.grids & MEDIUM_SEALED != 0),
-            node_copies: packed.bvh.copies,
+            tree_depth: packed.bvh.depth,
             tree: packed.immediate_count < packed.primitives.len(),
         }
     }
@@ -355,7 +355,7 @@ impl Features {
         let numbers = [
             ("MAX_DEPTH", self.max_depth),
             ("RR_DEPTH", self.rr_depth),
-            ("NODE_COPIES", self.node_copies),
+            ("WALK_STACK", self.tree_depth.max(1)),
             ("SHARERS", self.sharers),
         ]
         .map(|(name, value)| format!("const uint {name} = {value}u;\n"))

@@ -372,12 +372,16 @@ gpu_struct! {
         seed: u32,
         /// Lower corner of the nodes' grid.
         grid_origin: Vec3,
-        /// Nodes in one copy of the tree.
-        node_count: u32,
+        /// Where lamps are found apart, index of the first of as many numbers as the crop window has pixels: 1 where paths leave them out.
+        first_seen: u32,
         /// Grid step of the nodes' bounds.
         grid_step: Vec3,
         /// Lights in the table.
         light_count: u32,
+        /// The corner of the tree opposite to `grid_origin`, in steps.
+        tree_size: Vec3,
+        /// Fills up.
+        unused: u32,
         /// 1 / width of the whole film.
         inverse_width: f32,
         /// 1 / height of the whole film.
@@ -427,14 +431,6 @@ gpu_struct! {
         pilot_scale: Vec3,
         /// Index of the first number of the pilot's blocks of pixels: of each one over the square of its radiance, and one that fills up.
         first_block: u32,
-        /// Where lamps are found apart, index of the first of as many numbers as the crop window has pixels: 1 where paths leave them out.
-        first_seen: u32,
-        /// Fills the last sixteen bytes.
-        unused_1: u32,
-        /// The same.
-        unused_2: u32,
-        /// The same.
-        unused_3: u32,
     }
 }
 

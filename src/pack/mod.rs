@@ -218,8 +218,8 @@ impl Packed {
         params = Params {
             seed,
             grid_origin: bvh.grid_origin,
-            node_count: bvh.node_count,
             grid_step: bvh.grid_step,
+            tree_size: bvh.size,
             light_count: lights.len() as u32,
             medium_count: media.len() as u32,
             first_sky,
@@ -253,14 +253,10 @@ impl Packed {
     /// The same scene with at most `most` primitives in the kernel and all others in the hierarchy: for comparisons.
     pub fn with_immediates(self, most: usize) -> Packed {
         let Arranged { bvh, primitives, corners, immediate_count } = arrange(self.primitives, self.corners, most);
-        let params = Params {
-            grid_origin: bvh.grid_origin,
-            node_count: bvh.node_count,
-            grid_step: bvh.grid_step,
-            ..self.params
-        };
+        let params =
+            Params { grid_origin: bvh.grid_origin, grid_step: bvh.grid_step, tree_size: bvh.size, ..self.params };
         let tree = immediate_count < primitives.len();
-        let features = Features { node_copies: bvh.copies, tree, ..self.features };
+        let features = Features { tree_depth: bvh.depth, tree, ..self.features };
         Packed { bvh, primitives, corners, immediate_count, params, features, ..self }
     }
 
@@ -353,7 +349,7 @@ const EMPTY_FEATURES: Features = Features {
     sharers: 0,
     seen: false,
     sealed: false,
-    node_copies: 8,
+    tree_depth: 0,
     tree: true,
 };
 

@@ -1,6 +1,7 @@
 //! Mirror of `shaders/lib/bindings.glsl`: the tables of the scene, their numbers widened to double precision.
 
 use super::grid::Grid;
+use crate::pack::bvh::Node;
 use crate::pack::features::Features;
 use crate::pack::{Packed, layout, sobol};
 use glam::{DVec2, DVec3};
@@ -9,7 +10,7 @@ use glam::{DVec2, DVec3};
 #[derive(Clone, Debug)]
 pub struct Tables {
     /// Of the hierarchy.
-    pub nodes: Vec<[u32; 4]>,
+    pub nodes: Vec<Node>,
     /// In the order of the hierarchy's leaves.
     pub primitives: Vec<Primitive>,
     /// How many of them stand before those of the tree.
@@ -141,8 +142,8 @@ pub struct Params {
     pub camera_down: DVec3,
     pub seed: u32,
     pub grid_origin: DVec3,
-    pub node_count: u32,
     pub grid_step: DVec3,
+    pub tree_size: DVec3,
     pub inverse_width: f64,
     pub inverse_height: f64,
     pub crop_x: u32,
@@ -310,8 +311,8 @@ impl From<&layout::Params> for Params {
             camera_down: from.camera_down.as_dvec3(),
             seed: from.seed,
             grid_origin: from.grid_origin.as_dvec3(),
-            node_count: from.node_count,
             grid_step: from.grid_step.as_dvec3(),
+            tree_size: from.tree_size.as_dvec3(),
             inverse_width: f64::from(from.inverse_width),
             inverse_height: f64::from(from.inverse_height),
             crop_x: from.crop_x,

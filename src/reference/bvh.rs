@@ -1,31 +1,29 @@
 //! Mirror of `shaders/lib/bvh.glsl`: one step of the walk through the hierarchy. See [`crate::pack::bvh`] for the layout.
 
-use glam::{DVec3, UVec3};
+use crate::pack::bvh::Node;
+use glam::{BVec3, DVec3, UVec3};
 
 /// The ray in the grid of the nodes' bounds: the slab test is bound · scale + offset.
 #[derive(Clone, Copy, Debug)]
 pub struct GridRay {
     scale: DVec3,
     offset: DVec3,
-    near_shift: UVec3,
-    octant: u32,
+    negative: BVec3,
 }
 
-/// Where a walk stands.
-#[derive(Clone, Copy, Debug)]
+/// Where a walk stands. The kernel has the number of places on the stack that the tree needs.
+#[derive(Clone, Debug)]
 pub struct Walk {
-    /// The next node.
-    pub node: u32,
-    /// Behind the last node.
-    pub end: u32,
-    /// 0: none pending; else 1 + (first primitive << 3 | primitives left − 1).
-    pub leaf: u32,
+    node: Option<u32>,
+    first: u32,
+    pending: u32,
+    stack: Vec<u32>,
 }
 
 impl Walk {
-    /// Whether nothing is left to visit.
-    pub fn is_done(&self) -> bool {
-        self.node >= self.end && self.leaf == 0
+    /// The next node, unless primitives are to be tested first.
+    pub fn next_node(&self) -> Option<u32> {
+        self.node.filter(|_| self.pending == 0)
     }
 }
 
@@ -34,42 +32,72 @@ pub fn grid_ray(origin: DVec3, direction: DVec3, grid_origin: DVec3, grid_step: 
     // A component too small to be inverted is as good as a small one: it moves the slabs by less than their margin.
     let safe = DVec3::select(direction.abs().cmplt(DVec3::splat(1e-9)), DVec3::splat(1e-9), direction);
     let inverse = 1.0 / safe;
-    let negative = safe.cmplt(DVec3::ZERO);
-    let bits = UVec3::new(u32::from(negative.x), u32::from(negative.y), u32::from(negative.z));
-    GridRay {
-        scale: inverse * grid_step,
-        offset: (grid_origin - origin) * inverse,
-        near_shift: bits * 16,
-        octant: bits.x | bits.y << 1 | bits.z << 2,
+    GridRay { scale: inverse * grid_step, offset: (grid_origin - origin) * inverse, negative: safe.cmplt(DVec3::ZERO) }
+}
+
+/// A walk that begins at the root, if the ray meets the tree at all: from the corner 0 of its grid to `size`.
+pub fn start_walk(ray: &GridRay, size: DVec3, t_max: f64) -> Walk {
+    let (one, other) = (ray.offset, size * ray.scale + ray.offset);
+    let met = one.min(other).max_element().max(0.0) <= one.max(other).min_element().min(t_max);
+    Walk { node: met.then_some(0), first: 0, pending: 0, stack: Vec::new() }
+}
+
+/// On from a node whose first inner child this is, to those of its children that are hit, the nearest first.
+fn advance_walk(first_child: u32, mut hits: Vec<(f64, u32)>, walk: &mut Walk) {
+    hits.sort_by(|one, two| one.0.total_cmp(&two.0));
+    if let Some(&(_, next)) = hits.get(1) {
+        let after = hits.get(2).map_or(next, |hit| hit.1);
+        let last = hits.get(3).map_or(after, |hit| hit.1);
+        walk.stack.push(first_child << 6 | next << 4 | after << 2 | last);
     }
+    if let Some((_, nearest)) = hits.first() {
+        walk.node = Some(first_child + nearest);
+        return;
+    }
+    walk.node = walk.stack.pop().map(|top| {
+        let (of_top, next, last) = (top >> 4 & 3, top >> 2 & 3, top & 3);
+        if next != of_top {
+            walk.stack.push(top & !63 | next << 4 | last << 2 | last);
+        }
+        (top >> 6) + of_top
+    });
 }
 
-/// The walk's start in the copy of the tree for the ray's octant.
-pub fn start_walk(ray: &GridRay, node_count: u32, copies: u32) -> Walk {
-    let first = if copies == 8 { ray.octant * node_count } else { 0 };
-    Walk { node: first, end: first + node_count, leaf: 0 }
+/// Tests the children of one node.
+pub fn step_walk(node: &Node, ray: &GridRay, t_max: f64, walk: &mut Walk) {
+    let origin = UVec3::new(node[6] & 0xffff, node[6] >> 16, node[7] & 0xffff).as_dvec3();
+    let offset = origin * ray.scale + ray.offset;
+    let steps = [16, 20, 24].map(|shift| f64::from(1u32 << (node[7] >> shift & 15)));
+    let scale = ray.scale * DVec3::from(steps);
+    let bound =
+        |first: usize, k: u32| UVec3::from([0, 1, 2].map(|axis| node[first + axis] >> (8 * k) & 0xff)).as_dvec3();
+    let kinds = node[8] & 63 | (node[9] & 63) << 6;
+    let mut before = 0;
+    walk.first = node[9] >> 6;
+    let mut hits: Vec<(f64, u32)> = Vec::new();
+    for k in 0..4 {
+        let (low, high) = (bound(0, k), bound(3, k));
+        let t_near = DVec3::select(ray.negative, high, low) * scale + offset;
+        let t_far = DVec3::select(ray.negative, low, high) * scale + offset;
+        let enter = t_near.max_element().max(0.0);
+        let hit = enter <= t_far.min_element().min(t_max);
+        let kind = kinds >> (3 * k) & 7;
+        let inner = kind == 7;
+        if hit && inner {
+            hits.push((enter, k));
+        }
+        let count = if inner { 0 } else { kind };
+        walk.pending |= if hit { ((1 << count) - 1) << before } else { 0 };
+        before += count;
+    }
+    advance_walk(node[8] >> 6, hits, walk);
 }
 
-/// Tests one node.
-pub fn step_walk(node: [u32; 4], ray: &GridRay, t_max: f64, copies: u32, walk: &mut Walk) {
-    let words = UVec3::new(node[0], node[1], node[2]);
-    let near_shift = if copies == 8 { UVec3::ZERO } else { ray.near_shift };
-    let near = (words >> near_shift) & 0xffff;
-    let far = (words >> (UVec3::splat(16) - near_shift)) & 0xffff;
-    let t_near = near.as_dvec3() * ray.scale + ray.offset;
-    let t_far = far.as_dvec3() * ray.scale + ray.offset;
-    let enter = t_near.max_element().max(0.0);
-    let leave = t_far.min_element().min(t_max);
-    let hit = enter <= leave;
-    let leaf = (node[3] as i32) < 0;
-    walk.node = if hit || leaf { walk.node + 1 } else { node[3] };
-    walk.leaf = if hit && leaf { (node[3] & 0x7fff_ffff) + 1 } else { 0 };
-}
-
-/// The primitive that a pending leaf asks for; the leaf moves on to its next one.
-pub fn next_primitive(walk: &mut Walk) -> u32 {
-    let word = walk.leaf - 1;
-    // One further, one fewer left: + 8 − 1 in the word.
-    walk.leaf = if word & 7 == 0 { 0 } else { walk.leaf + 7 };
-    word >> 3
+/// The next primitive of those that wait for their test.
+pub fn next_primitive(walk: &mut Walk) -> Option<u32> {
+    let bit = walk.pending.trailing_zeros();
+    (bit < u32::BITS).then(|| {
+        walk.pending &= walk.pending - 1;
+        walk.first + bit
+    })
 }

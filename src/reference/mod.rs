@@ -202,19 +202,21 @@ fn find_samples(tables: &Tables, pixels: &[u32], sample_index: u32) -> Vec<Found
 
 /// Answers the ray that a path asks for.
 pub fn traverse(tables: &Tables, path: &Path) -> path::Hit {
-    let (params, copies) = (&tables.params, tables.features.node_copies);
+    let params = &tables.params;
     let mut hit = begin_hit(tables, path);
     let ray = Ray::new(path.origin, path.direction);
     let grid = grid_ray(path.origin, path.direction, params.grid_origin, params.grid_step);
-    let mut walk = start_walk(&grid, params.node_count, copies);
+    let mut walk = start_walk(&grid, params.tree_size, hit.t);
     for index in 0..tables.immediate_count {
         test_primitive(tables, path, &ray, index, &mut hit);
     }
-    while !walk.is_done() && !hit.blocked {
-        if walk.leaf != 0 {
-            test_primitive(tables, path, &ray, next_primitive(&mut walk), &mut hit);
+    while !hit.blocked {
+        if let Some(index) = next_primitive(&mut walk) {
+            test_primitive(tables, path, &ray, index, &mut hit);
+        } else if let Some(node) = walk.next_node() {
+            step_walk(&tables.nodes[node as usize], &grid, hit.t, &mut walk);
         } else {
-            step_walk(tables.nodes[walk.node as usize], &grid, hit.t, copies, &mut walk);
+            break;
         }
     }
     hit
