@@ -240,7 +240,7 @@ fn the_tree_misses_nothing() {
         // One step less on one side of one node is seen.
         walks.packed.bvh.nodes = bounds;
         let root = &mut walks.packed.bvh.nodes[0];
-        root[3] = (root[3] & !0xff) | (root[3] & 0xff) / 2;
+        root[3] = (root[3] & !0xff) | ((root[3] & 0xff) / 2);
         assert!(differ(&walks.run()) > 0, "{name}: a bound that cuts off a part goes unseen");
     }
     // Without a hole there is no leak, with one there is: the counter is not blind.

@@ -102,10 +102,12 @@ vec3 plastic_diffuse(Surface surface, float through_i, float through_o) {
     return body * (through_i * through_o / (surface.eta * surface.eta));
 }
 
-// Probability of plastic's specular lobe.
+// Probability of plastic's specular lobe: its part of what is reflected, but a quarter at least. Light sampling does much of the diffuse lobe's
+// work; what a coat without roughness mirrors is found in no other way.
 float plastic_specular_probability(Surface surface, float through_i) {
     float specular = (1.0 - through_i) * surface.specular_weight;
-    return specular / max(specular + through_i * (1.0 - surface.specular_weight), 1e-30);
+    float part = specular / max(specular + through_i * (1.0 - surface.specular_weight), 1e-30);
+    return surface.specular_weight > 0.0 ? max(part, 0.25) : 0.0;
 }
 
 BsdfValue eval_bsdf(Surface surface, vec3 wi, vec3 wo) {

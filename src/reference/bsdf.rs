@@ -113,10 +113,11 @@ fn plastic_diffuse(surface: &Surface, through_i: f64, through_o: f64) -> DVec3 {
     body / (DVec3::ONE - internal) * (through_i * through_o / (surface.eta * surface.eta))
 }
 
-/// Probability of plastic's specular lobe.
+/// Probability of plastic's specular lobe: its part of what is reflected, but a quarter at least.
 fn plastic_specular_probability(surface: &Surface, through_i: f64) -> f64 {
     let specular = (1.0 - through_i) * surface.specular_weight;
-    specular / (specular + through_i * (1.0 - surface.specular_weight)).max(1e-30)
+    let part = specular / (specular + through_i * (1.0 - surface.specular_weight)).max(1e-30);
+    if surface.specular_weight > 0.0 { part.max(0.25) } else { 0.0 }
 }
 
 /// Density of the facet's normal, Smith's shadowing and masking of both directions, and the density of sampling the facet.
