@@ -80,8 +80,8 @@ void main() {
                 pairs = pairs_of(gl_WorkGroupID.x * (samples_in_tile / SHARERS) + of_group);
                 first = load_end(record, 0u);
                 first.kind = all(lessThan(origin + place, size)) ? first.kind : END_NONE;
-                vec4 left = SAMPLE(record + 2u);
-                path.left = uint(left.x) | uint(left.y) << 16u;
+                uvec2 left = whole(SAMPLE(record + 2u).xy);
+                path.left = left.x | left.y << 16u;
                 if (HAS_CHROMATIC) {
                     weight = SAMPLE(record + RECORD_WEIGHT).xyz;
                 }

@@ -120,7 +120,7 @@ fn features() -> Vec<Features> {
     for (_, scene) in scenes::all() {
         let needed = scenes::pack(&scene, 1).features;
         let sharing = [4, 8].map(|sharers| Features { sharers, grids: false, masks: false, ..needed });
-        features.extend([needed, needed.everything(), Features { tree_depth: 12, ..needed }]);
+        features.extend([needed, needed.everything(), Features { walk_stack: 12, ..needed }]);
         features.extend(sharing);
     }
     features

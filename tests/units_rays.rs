@@ -145,7 +145,7 @@ impl Walks {
     }
 
     fn run(&self) -> Vec<[f32; 4]> {
-        let features = Features { tree_depth: self.packed.bvh.depth, ..variant().features };
+        let features = Features { walk_stack: self.packed.bvh.stack, ..variant().features };
         let rays = self.rays.iter();
         let inputs: Vec<[f32; 4]> =
             rays.flat_map(|[o, d]| [vec4(&[o.x, o.y, o.z, 100.0]), vec4(&d.to_array())]).collect();
@@ -237,7 +237,11 @@ fn the_tree_misses_nothing() {
             pairs.filter(|(a, b)| (a[0], a[2], a[3]) != (b[0], b[2], b[3])).count()
         };
         assert_eq!(differ(&outputs), 0, "{name}: rays that the tree answers otherwise");
-        // One step less on one side of one node is seen.
+        // With all children on it, a stack that is too small loses some.
+        let stack = std::mem::replace(&mut walks.packed.bvh.stack, 1);
+        assert!(differ(&walks.run()) > 0, "{name}: a stack of one entry goes unseen");
+        walks.packed.bvh.stack = stack;
+        // So does a bound that cuts off a half.
         walks.packed.bvh.nodes = bounds;
         let root = &mut walks.packed.bvh.nodes[0];
         root[3] = (root[3] & !0xff) | ((root[3] & 0xff) / 2);

@@ -86,7 +86,7 @@ vec3 refract_at(vec3 w, vec3 m, float cos_t, float eta) {
 float coat_transmittance(Surface surface, float cosine) {
     if (HAS_ROUGH_PLASTIC && surface.value_count != 0u) {
         float place = cosine * float(surface.value_count - 1u);
-        uint entry = min(uint(place), surface.value_count - 2u);
+        uint entry = min(whole(place), surface.value_count - 2u);
         return mix(VALUE(surface.first_value + entry), VALUE(surface.first_value + entry + 1u), place - float(entry));
     }
     float unused;

@@ -1,4 +1,5 @@
 // Which pixel and sample an invocation works on.
+#include "lib/math.glsl"
 
 // Column and row, within the crop window, of a pixel of a tile. Tiles and the pixels in them go row by row.
 uvec2 tile_pixel(uint tile, uint pixel, uint crop_width) {
@@ -8,7 +9,7 @@ uvec2 tile_pixel(uint tile, uint pixel, uint crop_width) {
 
 // a / b for a below 2^22: devices that divide integers one by one, as lavapipe does, take much longer for that.
 uint quotient(uint a, uint b) {
-    return uint((float(a) + 0.5) / float(b));
+    return whole((float(a) + 0.5) / float(b));
 }
 
 // Where pixels share paths, columns and rows of their groups are shifted by these for a sample: all groups meet all their neighbours in

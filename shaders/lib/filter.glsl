@@ -5,6 +5,7 @@
 // src/pack/filter.rs) holds the integrals of |filter| up to the edges of the cells and, behind them, those of the filter itself.
 // They are read by VALUE(i), which the kernel declares.
 #include "lib/constants.glsl"
+#include "lib/math.glsl"
 
 struct FilterSample {
     float offset; // from the pixel's centre, in pixels
@@ -14,7 +15,7 @@ struct FilterSample {
 // The integral of the table that begins at `first` up to a place that is counted in cells, in [0, cells].
 float filter_integral(uint first, uint cells, float place) {
     float cell = min(floor(place), float(cells - 1u));
-    return mix(VALUE(first + uint(cell)), VALUE(first + uint(cell) + 1u), place - cell);
+    return mix(VALUE(first + whole(cell)), VALUE(first + whole(cell) + 1u), place - cell);
 }
 
 // A distance from the pixel's centre within the bounds (pixels), which must contain 0, and its factor.
@@ -49,7 +50,7 @@ float filter_pdf(uint first, uint cells, float radius, vec2 bounds, float offset
     if (place < ends.x || place >= ends.y) {
         return 0.0;
     }
-    uint cell = first + min(uint(place), cells - 1u);
+    uint cell = first + min(whole(place), cells - 1u);
     float total = filter_integral(first, cells, ends.y) - filter_integral(first, cells, ends.x);
     return (VALUE(cell + 1u) - VALUE(cell)) * cells_a_pixel / total;
 }

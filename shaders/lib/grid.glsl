@@ -179,7 +179,7 @@ bool walk_to_collision(Grid grid, uint kind, inout GridWalk walk, inout float ta
 // The mean of the cell in which a point of the unit cube lies.
 float grid_mean(Grid grid, vec3 local) {
     vec3 cells = vec3(grid.cells_x, grid.cells_y, grid.cells_z);
-    return VALUE(cell_numbers(grid, uvec3(clamp(floor(local * cells), vec3(0.0), cells - 1.0))) + 2u);
+    return VALUE(cell_numbers(grid, whole(clamp(floor(local * cells), vec3(0.0), cells - 1.0))) + 2u);
 }
 
 // Four numbers of a stream.

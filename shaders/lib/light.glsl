@@ -14,7 +14,7 @@ struct LightSample {
 // One line of the alias table (Walker 1977): `u` in [0, 1) is split into a choice and a number that is uniform again.
 uint alias_line(uint count, inout float u) {
     float scaled = u * float(count);
-    uint line = min(uint(scaled), count - 1u);
+    uint line = min(whole(scaled), count - 1u);
     u = min(scaled - float(line), 0.99999994);
     return line;
 }

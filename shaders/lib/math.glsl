@@ -1,6 +1,20 @@
 // Elementary functions with the accuracy that drivers do not promise, and orthonormal frames.
 #include "lib/constants.glsl"
 
+// The whole part of a number from 0 to below 2^31. lavapipe's compiler has an instruction for int(), but converts one invocation after the
+// other for uint().
+uint whole(float x) {
+    return uint(int(x));
+}
+
+uvec2 whole(vec2 x) {
+    return uvec2(ivec2(x));
+}
+
+uvec3 whole(vec3 x) {
+    return uvec3(ivec3(x));
+}
+
 // -log(x) for x in (0, 1], normal. Relative error below 3e-7; drivers' log() loses all digits near 1. x is split into m 2^e with m in
 // [sqrt(1/2), sqrt(2)), and log m = 2 artanh((m - 1)/(m + 1)).
 float minus_log(float x) {

@@ -5,6 +5,7 @@
 // which costs no more than the difference is worth: L' + (L - L')/q for any L'. The best q is the root of the variance that the
 // rest of the path adds to the pixel over the time it takes, in units of those of the image (Rath et al. 2022, "EARS").
 #include "lib/constants.glsl"
+#include "lib/math.glsl"
 
 // The least probability to go on: no weight grows beyond 1/LEAST_KEEP at a vertex, whatever the pilot has missed.
 const float LEAST_KEEP = 0.3;
@@ -17,7 +18,7 @@ struct Outlook {
 
 // The cell of a point, in units of cells from the lower corner.
 uint outlook_cell(vec3 place, bool in_medium, vec3 axis) {
-    uvec3 cell = uvec3(clamp(place, vec3(0.0), vec3(float(PILOT_CELLS) - 0.5)));
+    uvec3 cell = whole(clamp(place, vec3(0.0), vec3(float(PILOT_CELLS) - 0.5)));
     vec3 size = abs(axis);
     uint along = size.x > size.y && size.x > size.z ? 0u : (size.y > size.z ? 1u : 2u);
     float component = along == 0u ? axis.x : (along == 1u ? axis.y : axis.z);

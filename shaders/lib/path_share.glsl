@@ -107,7 +107,7 @@ void store_end(uint record, uint which, Path path, Vertex vertex) {
 End load_end(uint record, uint which) {
     vec4 point = SAMPLE(record + which * SECOND), axis = SAMPLE(record + which * SECOND + 1u);
     vec3 normal = HAS_SHADING_NORMALS ? SAMPLE(record + NORMALS + which).xyz : axis.xyz;
-    return End(point.xyz, uint(point.w) & 3u, axis.xyz, normal, uint(point.w) >> 2u, axis.w);
+    return End(point.xyz, whole(point.w) & 3u, axis.xyz, normal, whole(point.w) >> 2u, axis.w);
 }
 
 bool can_share(Path path, Vertex vertex) {

@@ -3,6 +3,7 @@
 // and of numbers, are those of the file that includes this one.
 #include "lib/constants.glsl"
 #include "lib/layout.glsl"
+#include "lib/math.glsl"
 
 // A scattering angle. 1 - cos (of Henyey and Greenstein's with g < 0: 1 + cos) and the sine keep full relative accuracy.
 struct PhaseAngle {
@@ -66,7 +67,7 @@ PhaseAngle sample_rayleigh(float u) {
 // The table at a cosine in [-1, 1].
 float eval_tabulated(uint first, uint count, float cos_theta) {
     float place = (0.5 * cos_theta + 0.5) * float(count - 1u);
-    uint index = min(uint(max(place, 0.0)), count - 2u);
+    uint index = min(whole(max(place, 0.0)), count - 2u);
     float share = place - float(index);
     return (1.0 - share) * VALUE(first + index) + share * VALUE(first + index + 1u);
 }

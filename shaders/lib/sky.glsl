@@ -51,10 +51,10 @@ vec3 sky_radiance(Texture sky, vec2 uv) {
     float x = uv.x * float(sky.width) - 0.5;
     float left = floor(x);
     float fx = x - left;
-    uint x0 = left < 0.0 ? sky.width - 1u : min(uint(left), sky.width - 1u);
+    uint x0 = left < 0.0 ? sky.width - 1u : min(whole(left), sky.width - 1u);
     uint x1 = x0 + 1u == sky.width ? 0u : x0 + 1u;
     float y = clamp(uv.y, 0.0, 1.0) * float(sky.height - 1u);
-    uint y0 = min(uint(y), sky.height - 2u);
+    uint y0 = min(whole(y), sky.height - 2u);
     float fy = y - float(y0);
     vec3 above = sky_pixel(sky, x0, y0) * (1.0 - fx) + sky_pixel(sky, x1, y0) * fx;
     vec3 below = sky_pixel(sky, x0, y0 + 1u) * (1.0 - fx) + sky_pixel(sky, x1, y0 + 1u) * fx;
@@ -78,8 +78,8 @@ float sky_probability(uint first, uint count, uint index) {
 
 SkyCell sky_cell(uint first, uint count, float u) {
     float step = min(floor(u * SKY_STEPS), SKY_STEPS - 1.0);
-    uint guide = first + uint(step * (float(count) / SKY_STEPS)), borders = first + count + 1u;
-    uint index = uint(VALUE(guide)), last = uint(VALUE(guide + 1u));
+    uint guide = first + whole(step * (float(count) / SKY_STEPS)), borders = first + count + 1u;
+    uint index = whole(VALUE(guide)), last = whole(VALUE(guide + 1u));
     [[dont_unroll]] while (index < last) {
         uint middle = (index + last) / 2u;
         bool beyond = step >= VALUE(borders + middle + 1u);
@@ -100,8 +100,8 @@ float sky_cell_pdf(Texture sky, float of_row, float of_column) {
 // Density per solid angle of a direction of height y, which the image has at u.
 float sky_pdf(Texture sky, float u, float y) {
     uint columns = sky_columns(sky), rows = sky_rows(sky);
-    uint row = min(uint(max(0.5 - 0.5 * y, 0.0) * float(rows)), rows - 1u);
-    uint column = min(uint(u * float(columns)), columns - 1u);
+    uint row = min(whole(max(0.5 - 0.5 * y, 0.0) * float(rows)), rows - 1u);
+    uint column = min(whole(u * float(columns)), columns - 1u);
     return sky_cell_pdf(sky, sky_probability(sky.first_weight, rows, row), sky_probability(sky_row(sky, row), columns, column));
 }
 

@@ -41,8 +41,8 @@ pub type Node = [u32; 10];
 pub struct Bvh {
     /// The root, then the children of each node together.
     pub nodes: Vec<Node>,
-    /// Levels of nodes below the root: what a walk may have to keep on its stack.
-    pub depth: u32,
+    /// Most entries that a walk can have on its stack: nodes with more than one inner child on the way to a node.
+    pub stack: u32,
     /// Lower corner of the grid.
     pub grid_origin: Vec3,
     /// Step of the grid.
@@ -104,16 +104,16 @@ impl Bvh {
         };
         let tree = build_bvh2(&boxes, config, &mut Default::default());
         let grid = Grid::new(&tree, whole);
-        let mut flattened = Flattened { tree: &tree, grid: &grid, nodes: Vec::new(), order: Vec::new(), depth: 0 };
+        let mut flattened = Flattened { tree: &tree, grid: &grid, nodes: Vec::new(), order: Vec::new(), stack: 0 };
         flattened.build(first);
-        let Flattened { nodes, order, depth, .. } = flattened;
+        let Flattened { nodes, order, stack, .. } = flattened;
         let size = grid.quantize(&tree.nodes[0].aabb).1.as_vec3();
-        (Bvh { nodes, depth, grid_origin: grid.origin, grid_step: grid.step, size }, order)
+        (Bvh { nodes, stack, grid_origin: grid.origin, grid_step: grid.step, size }, order)
     }
 
     /// A tree that no ray hits: its root has no children.
     fn empty() -> Bvh {
-        Bvh { nodes: vec![[0; 10]], depth: 0, grid_origin: Vec3::ZERO, grid_step: Vec3::ONE, size: Vec3::ZERO }
+        Bvh { nodes: vec![[0; 10]], stack: 0, grid_origin: Vec3::ZERO, grid_step: Vec3::ONE, size: Vec3::ZERO }
     }
 }
 
@@ -151,17 +151,19 @@ struct Flattened<'a> {
     grid: &'a Grid,
     nodes: Vec<Node>,
     order: Vec<u32>,
-    depth: u32,
+    stack: u32,
 }
 
 impl Flattened<'_> {
     fn build(&mut self, first: u32) {
         self.nodes.push([0; 10]);
-        // A node that is to be written, the node of two that it comes from, and its depth.
+        // A node that is to be written, the node of two that it comes from, and what is on the stack when a walk comes to it.
         let mut stack = vec![(0usize, 0usize, 0u32)];
-        while let Some((place, root, depth)) = stack.pop() {
-            self.depth = self.depth.max(depth);
+        while let Some((place, root, above)) = stack.pop() {
             let children = self.children(root);
+            let inner = children.iter().filter(|&&child| !self.tree.nodes[child].is_leaf()).count();
+            let above = above + u32::from(inner > 1);
+            self.stack = self.stack.max(above);
             let first_inner = self.nodes.len();
             let first_primitive = first + self.order.len() as u32;
             let mut kinds = [0; WIDTH];
@@ -173,7 +175,7 @@ impl Flattened<'_> {
                     self.order.extend(&self.tree.primitive_indices[primitives]);
                 } else {
                     *kind = INNER;
-                    stack.push((self.nodes.len(), child, depth + 1));
+                    stack.push((self.nodes.len(), child, above));
                     self.nodes.push([0; 10]);
                 }
             }

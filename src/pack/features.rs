@@ -118,8 +118,8 @@ pub struct Features {
     pub sharers: u32,
     /// The light of lamps that the camera sees is found apart, for some pixels ([`crate::seen`]).
     pub seen: bool,
-    /// Levels of nodes below the root of the tree.
-    pub tree_depth: u32,
+    /// Entries on the stack of walks through the tree.
+    pub walk_stack: u32,
     /// Primitives in the tree; without, all stand in the kernel.
     pub tree: bool,
 }
@@ -224,7 +224,7 @@ impl Features {
             sharers: 0,
             seen: false,
             sealed: packed.media.iter().any(|medium| medium.grids & MEDIUM_SEALED != 0),
-            tree_depth: packed.bvh.depth,
+            walk_stack: packed.bvh.stack,
             tree: packed.immediate_count < packed.primitives.len(),
         }
     }
@@ -355,7 +355,7 @@ impl Features {
         let numbers = [
             ("MAX_DEPTH", self.max_depth),
             ("RR_DEPTH", self.rr_depth),
-            ("WALK_STACK", self.tree_depth.max(1)),
+            ("WALK_STACK", self.walk_stack.max(1)),
             ("SHARERS", self.sharers),
         ]
         .map(|(name, value)| format!("const uint {name} = {value}u;\n"))

@@ -256,7 +256,7 @@ impl Packed {
         let params =
             Params { grid_origin: bvh.grid_origin, grid_step: bvh.grid_step, tree_size: bvh.size, ..self.params };
         let tree = immediate_count < primitives.len();
-        let features = Features { tree_depth: bvh.depth, tree, ..self.features };
+        let features = Features { walk_stack: bvh.stack, tree, ..self.features };
         Packed { bvh, primitives, corners, immediate_count, params, features, ..self }
     }
 
@@ -349,7 +349,7 @@ const EMPTY_FEATURES: Features = Features {
     sharers: 0,
     seen: false,
     sealed: false,
-    tree_depth: 0,
+    walk_stack: 0,
     tree: true,
 };
 
