@@ -369,11 +369,12 @@ fn rough_surfaces_at_the_ends_of_their_numbers() {
     for (query, answer) in queries.iter().zip(&answers) {
         assert!(check(answer), "{query:?}: {answer:?}");
         // Of visible facets (Heitz 2018): what is masked is the weight, so it is no more than 1, but for what refraction compresses. Of
-        // plastic's body, the weight depends on how often it is chosen.
-        let flags = surfaces[query.surface].flags;
-        let facets = flags >> SURFACE_KIND_SHIFT != BSDF_PLASTIC || flags & SURFACE_GGX != 0;
+        // plastic's body, which is chosen by its mean over the channels and may leave a quarter of the samples to the coat, 4/3 of what its
+        // brightest channel has of that mean.
+        let plastic = surfaces[query.surface].flags >> SURFACE_KIND_SHIFT == BSDF_PLASTIC;
+        let most = if plastic { 2.1 } else { 1.001 };
         assert!(
-            !facets || answer.weight.iter().all(|weight| (0.0..1.001).contains(&(weight * answer.eta * answer.eta))),
+            answer.weight.iter().all(|weight| (0.0..most).contains(&(weight * answer.eta * answer.eta))),
             "{query:?}: {answer:?}"
         );
     }
