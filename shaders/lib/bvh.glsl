@@ -1,4 +1,5 @@
-// One step of the walk through the hierarchy (see src/pack/bvh.rs for the layout of a node).
+// One step of the walk through the hierarchy (see src/pack/bvh.rs for the layout of a node). NODE_WORDS(i), the table of nodes as pairs of
+// words, is that of the file that includes this one.
 #include "lib/constants.glsl"
 
 const uint NO_NODE = 0xffffffffu;
@@ -30,8 +31,10 @@ struct Walk {
 const uint INNER = 7u; // kind of a child that is a node
 const int MISS = 0x7fffffff; // a distance behind all others
 
-Node unpack_node(uvec2 a, uvec2 b, uvec2 c, uvec2 d, uvec2 e) {
-    return Node(uvec3(a, b.x), uvec3(b.y, c), d, e.x, e.y);
+Node load_node(uint index) {
+    uint at = 5u * index;
+    uvec2 low_xy = NODE_WORDS(at), between = NODE_WORDS(at + 1u), high_yz = NODE_WORDS(at + 2u), frame = NODE_WORDS(at + 3u), links = NODE_WORDS(at + 4u);
+    return Node(uvec3(low_xy, between.x), uvec3(between.y, high_yz), frame, links.x, links.y);
 }
 
 GridRay grid_ray(vec3 origin, vec3 direction, vec3 grid_origin, vec3 grid_step) {

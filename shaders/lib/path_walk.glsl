@@ -6,11 +6,6 @@
 
 const uint NODE_STEPS = 2u;
 
-Node load_node(uint index) {
-    uint at = 5u * index;
-    return unpack_node(NODE_WORDS(at), NODE_WORDS(at + 1u), NODE_WORDS(at + 2u), NODE_WORDS(at + 3u), NODE_WORDS(at + 4u));
-}
-
 void begin_ray(Path path, out Ray ray, inout GridRay grid, inout Walk walk, out Hit hit) {
     hit = begin_hit(path);
     ray.origin = path.origin;

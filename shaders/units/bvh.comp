@@ -6,7 +6,6 @@
 #include "lib/features.glsl"
 #include "lib/math.glsl"
 #include "lib/ray.glsl"
-#include "lib/bvh.glsl"
 
 layout(local_size_x = WORKGROUP) in;
 layout(set = 0, binding = 0, std430) readonly buffer Inputs { vec4 inputs[]; };
@@ -15,10 +14,8 @@ layout(set = 0, binding = 2, std430) readonly buffer Primitives { Primitive prim
 layout(set = 0, binding = 3, std430) readonly buffer ParamsBuffer { Params params; };
 layout(set = 0, binding = 4, std430) buffer Outputs { vec4 outputs[]; };
 
-Node load_node(uint index) {
-    uint at = 5u * index;
-    return unpack_node(nodes[at], nodes[at + 1u], nodes[at + 2u], nodes[at + 3u], nodes[at + 4u]);
-}
+#define NODE_WORDS(i) nodes[i]
+#include "lib/bvh.glsl"
 
 void main() {
     uint i = gl_GlobalInvocationID.x;

@@ -23,7 +23,7 @@ use obvhs::{Boundable, BvhBuildParams};
 /// Most primitives in a leaf.
 const MAX_LEAF: u32 = 6;
 /// Kind of a child that is a node.
-const INNER: u32 = 7;
+pub const INNER: u32 = 7;
 /// Most children of a node.
 const WIDTH: usize = 4;
 /// Bits of a kind.
@@ -36,7 +36,7 @@ pub const MAX_PRIMITIVES: usize = 1 << (32 - KINDS_BITS);
 /// A node: see the head of this file.
 pub type Node = [u32; 10];
 
-/// A flattened tree. The primitives of its leaves are contiguous in the order that [`Bvh::new`] returns.
+/// A flattened tree. The primitives of its leaves are contiguous in the order that [`Bvh::with_order`] returns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bvh {
     /// The root, then the children of each node together.
@@ -77,12 +77,6 @@ pub fn bounds_of_all(primitives: &[Primitive]) -> (Vec3, Vec3) {
 }
 
 impl Bvh {
-    /// Builds the tree and returns it with the primitives in the order of its leaves.
-    pub fn new(primitives: &[Primitive]) -> (Bvh, Vec<Primitive>) {
-        let (bvh, order) = Bvh::with_order(primitives, 0, Vec3::ZERO);
-        (bvh, order.iter().map(|&index| primitives[index as usize]).collect())
-    }
-
     /// Builds the tree and returns it with the indices of the primitives in the order of its leaves. The leaves count from
     /// `first` on. `whole` is the extent of the scene, of which the primitives may be a part.
     pub fn with_order(primitives: &[Primitive], first: u32, whole: Vec3) -> (Bvh, Vec<u32>) {
@@ -161,8 +155,9 @@ impl Flattened<'_> {
         let mut stack = vec![(0usize, 0usize, 0u32)];
         while let Some((place, root, above)) = stack.pop() {
             let children = self.children(root);
-            let inner = children.iter().filter(|&&child| !self.tree.nodes[child].is_leaf()).count();
-            let above = above + u32::from(inner > 1);
+            // Inner ones come first.
+            let several = children.get(1).is_some_and(|&child| !self.tree.nodes[child].is_leaf());
+            let above = above + u32::from(several);
             self.stack = self.stack.max(above);
             let first_inner = self.nodes.len();
             let first_primitive = first + self.order.len() as u32;
@@ -203,8 +198,10 @@ impl Flattened<'_> {
         let origin = bounds.iter().fold(UVec3::MAX, |least, (low, _)| least.min(*low));
         let end = bounds.iter().fold(UVec3::ZERO, |most, (_, high)| most.max(*high));
         // The least shift with which the extent fits into a byte, rounded up.
-        let shift =
-            (end - origin).to_array().map(|extent| (0..).find(|&k| extent.div_ceil(1 << k) <= 255).unwrap_or(0));
+        let fits = |extent: u32, shift: &u32| extent.div_ceil(1 << shift) <= 255;
+        let shift = (end - origin)
+            .to_array()
+            .map(|extent| (0..16).find(|shift| fits(extent, shift)).expect("16 bits fit, shifted by 9"));
         let mut node = [0; 10];
         for (slot, (low, high)) in bounds.iter().enumerate() {
             for axis in 0..3 {

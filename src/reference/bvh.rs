@@ -1,6 +1,6 @@
 //! Mirror of `shaders/lib/bvh.glsl`: one step of the walk through the hierarchy. See [`crate::pack::bvh`] for the layout.
 
-use crate::pack::bvh::Node;
+use crate::pack::bvh::{INNER, Node};
 use glam::{BVec3, DVec3, UVec3};
 
 /// The ray in the grid of the nodes' bounds: the slab test is bound · scale + offset.
@@ -82,7 +82,7 @@ pub fn step_walk(node: &Node, ray: &GridRay, t_max: f64, walk: &mut Walk) {
         let enter = t_near.max_element().max(0.0);
         let hit = enter <= t_far.min_element().min(t_max);
         let kind = kinds >> (3 * k) & 7;
-        let inner = kind == 7;
+        let inner = kind == INNER;
         if hit && inner {
             hits.push((enter, k));
         }

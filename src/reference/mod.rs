@@ -206,10 +206,10 @@ pub fn traverse(tables: &Tables, path: &Path) -> path::Hit {
     let mut hit = begin_hit(tables, path);
     let ray = Ray::new(path.origin, path.direction);
     let grid = grid_ray(path.origin, path.direction, params.grid_origin, params.grid_step);
-    let mut walk = start_walk(&grid, params.tree_size, hit.t);
     for index in 0..tables.immediate_count {
         test_primitive(tables, path, &ray, index, &mut hit);
     }
+    let mut walk = start_walk(&grid, params.tree_size, hit.t);
     while !hit.blocked {
         if let Some(index) = next_primitive(&mut walk) {
             test_primitive(tables, path, &ray, index, &mut hit);

@@ -368,15 +368,16 @@ fn rough_surfaces_at_the_ends_of_their_numbers() {
     };
     for (query, answer) in queries.iter().zip(&answers) {
         assert!(check(answer), "{query:?}: {answer:?}");
-        // Of visible facets (Heitz 2018): what is masked is the weight, so it is no more than 1, but for what refraction compresses. Of
-        // plastic's body, which is chosen by its mean over the channels and may leave a quarter of the samples to the coat, 4/3 of what its
-        // brightest channel has of that mean.
-        let plastic = surfaces[query.surface].flags >> SURFACE_KIND_SHIFT == BSDF_PLASTIC;
-        let most = if plastic { 2.1 } else { 1.001 };
-        assert!(
-            answer.weight.iter().all(|weight| (0.0..most).contains(&(weight * answer.eta * answer.eta))),
-            "{query:?}: {answer:?}"
-        );
+        // Of visible facets (Heitz 2018): what is masked is the weight, so it is no more than 1, but for what refraction compresses. Plastic's
+        // body, which may leave a quarter of the samples to the coat, has 4/3; and that in the mean over the channels, by which it is
+        // chosen, where no facet of the coat is likely (GGX has some everywhere).
+        let flags = surfaces[query.surface].flags;
+        let plastic = flags >> SURFACE_KIND_SHIFT == BSDF_PLASTIC;
+        let weight = answer.weight.map(|weight| weight * answer.eta * answer.eta);
+        let mean = [weight.iter().sum::<f32>() / 3.0];
+        let weights = if plastic && flags & SURFACE_GGX == 0 { &mean[..] } else { &weight[..] };
+        let most = if plastic { 1.335 } else { 1.001 };
+        assert!(weights.iter().all(|weight| (0.0..most).contains(weight)), "{query:?}: {answer:?}");
     }
     for (query, facet) in queries.iter().zip(ask_facets(&surfaces, &queries)) {
         let numbers = [facet.density, facet.masking[0], facet.masking[1], facet.pdf];
