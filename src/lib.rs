@@ -5,6 +5,7 @@
 //! CPU) → [`render`] (blocks of samples into a film) → [`image`] (files and error measures).
 
 pub mod gpu;
+pub mod guide;
 pub mod image;
 pub mod pack;
 pub mod pilot;

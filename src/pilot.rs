@@ -59,8 +59,8 @@ const LEAST_PIXELS: usize = 4096;
 const LEAST_MAX_DEPTH: u32 = 8;
 /// The least depth with light behind second vertices.
 const LEAST_SHARED_DEPTH: u32 = 3;
-/// Scenes with more primitives are not copied for a pilot.
-const MOST_PRIMITIVES: usize = 4_000_000;
+/// Scenes with more primitives are not copied for a pilot, nor for guides.
+pub const MOST_PRIMITIVES: usize = 4_000_000;
 /// The film is divided into blocks of pixels, at most this many on a side.
 const MOST_BLOCKS: u32 = 32;
 /// Paths of each block.

@@ -7,6 +7,8 @@ mod common;
 
 #[path = "numerics/frames.rs"]
 mod frames;
+#[path = "numerics/guides.rs"]
+mod guides;
 #[path = "numerics/media.rs"]
 mod media;
 #[path = "numerics/meshes.rs"]

@@ -70,8 +70,8 @@ fn sampled(kind: u32, point: DVec3, numbers: &[DVec2]) -> Vec<[[f32; 4]; 3]> {
     let inputs: Vec<[f32; 4]> = numbers.iter().flat_map(|u| [vec4(&[x, y, z, u.y]), vec4(&[u.x, 0.0])]).collect();
     let lights = [rectangle(kind)];
     let count = numbers.len();
-    let outputs: Vec<[f32; 4]> = run("light", &inputs, &[bytemuck::cast_slice(&lights)], count, 3 * count);
-    outputs.chunks(3).map(|output| [output[0], output[1], output[2]]).collect()
+    let outputs: Vec<[f32; 4]> = run("light", &inputs, &[bytemuck::cast_slice(&lights)], count, 4 * count);
+    outputs.chunks(4).map(|output| [output[0], output[1], output[2]]).collect()
 }
 
 /// Where a sample lies on the rectangle.

@@ -325,9 +325,9 @@ fn lights_give_the_irradiance_of_closed_forms() {
                 })
                 .collect();
             let count = (side * side) as usize;
-            let outputs: Vec<[f32; 4]> = run("light", &inputs, &[bytemuck::cast_slice(&lights)], count, 3 * count);
+            let outputs: Vec<[f32; 4]> = run("light", &inputs, &[bytemuck::cast_slice(&lights)], count, 4 * count);
             let found = outputs
-                .chunks(3)
+                .chunks(4)
                 .map(|output| {
                     normal.dot(Vec3::from_slice(&output[0][..3]).as_dvec3()).max(0.0) * f64::from(output[1][0])
                 })
@@ -337,7 +337,7 @@ fn lights_give_the_irradiance_of_closed_forms() {
             assert!(agrees(found), "light {index} from {point}: {found}, expected {expected}");
             assert!(!agrees(found * 1.01) && !agrees(found * 0.99), "the comparison is blind");
             // The weight is the radiance over the density; to find a point has no density.
-            for output in outputs.chunks(3).filter(|output| output[1][3] > 0.0) {
+            for output in outputs.chunks(4).filter(|output| output[1][3] > 0.0) {
                 assert!((f64::from(output[1][0]) * f64::from(output[1][3]) - 1.0).abs() < 1e-5, "{output:?}");
             }
         }

@@ -323,6 +323,26 @@ fn undecided(light: &bindings::Light, point: DVec3) -> bool {
     rectangle(1.0 - 1e-4) != rectangle(1.0 + 1e-4)
 }
 
+/// What a lamp sends in the direction that the kernel asks for; nothing, where rounding may decide whether that meets it.
+fn met(light: &bindings::Light, point: DVec3, u: DVec2) -> Option<light::LightSample> {
+    let v = 1.5 * u - 0.25;
+    let towards = (light.origin + light.edge_1 * v.x + light.edge_2 * v.y - point).normalize();
+    let of_size = |scale: f64| {
+        let mut lamp = *light;
+        if light.kind == LIGHT_SPHERE {
+            lamp.edge_1.x *= scale;
+            return light::sphere_light_in(&lamp, point, towards);
+        }
+        let middle = if light.kind == LIGHT_TRIANGLE { 1.0 / 3.0 } else { 0.5 };
+        lamp.origin += (light.edge_1 + light.edge_2) * (middle * (1.0 - scale));
+        (lamp.edge_1, lamp.edge_2) = (light.edge_1 * scale, light.edge_2 * scale);
+        light::plane_light_in(&lamp, point, towards)
+    };
+    let [small, found, large] = [1.0 - 1e-3, 1.0, 1.0 + 1e-3].map(of_size);
+    let edge_on = light.kind != LIGHT_SPHERE && towards.dot(light.normal).abs() < 0.02;
+    (small.weight == large.weight && !edge_on).then_some(found)
+}
+
 #[test]
 fn light_sources() {
     let lights = lights();
@@ -336,7 +356,7 @@ fn light_sources() {
         }
     }
     let count = inputs.len() / 2;
-    let outputs: Vec<[f32; 4]> = run("light", &inputs, &[bytemuck::cast_slice(&lights)], count, 3 * count);
+    let outputs: Vec<[f32; 4]> = run("light", &inputs, &[bytemuck::cast_slice(&lights)], count, 4 * count);
     let names = [
         "light direction",
         "light distance",
@@ -346,11 +366,12 @@ fn light_sources() {
         "alias rescaled",
         "spot weight",
     ];
+    let (mut met_distance, mut seen) = (comparison("lamp in a direction, distance"), [0; 2]);
     let [mut rectangle_direction, mut rectangle_weight, mut rectangle_pdf] =
         ["rectangle light direction", "rectangle light weight", "rectangle light pdf"].map(comparison);
     let [mut direction, mut distance, mut sphere_distance, mut weight, mut pdf, mut rescaled, mut spot_weight] =
         names.map(comparison);
-    for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(4)) {
         let point = widen(&input[0][..3]);
         let u = DVec2::new(f64::from(input[1][0]), f64::from(input[0][3]));
         let index = input[1][1] as usize;
@@ -410,6 +431,15 @@ fn light_sources() {
                 pdf.scalar(&case, output[2][0], asked);
             }
         }
+        let lamp = [LIGHT_TRIANGLE, LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_SPHERE].contains(&light.kind);
+        if let Some(found) = lamp.then(|| met(light, point, u)).flatten() {
+            seen[usize::from(found.weight != DVec3::ZERO)] += 1;
+            assert_eq!(widen(&output[3][..3]), found.weight, "{case}: in a given direction");
+            let rim = light.kind == LIGHT_SPHERE && light.edge_1.x < 0.1;
+            if !rim {
+                met_distance.scalar(&case, output[3][3], found.distance);
+            }
+        }
         let mut rest = u.x;
         let line = light::alias_line(lights.len() as u32, &mut rest);
         let threshold = wide[line as usize].alias_threshold;
@@ -423,7 +453,8 @@ fn light_sources() {
         assert!((0.0..1.0).contains(&output[2][2]), "{case}: the rescaled number is {}", output[2][2]);
     }
     [direction, distance, sphere_distance, weight, pdf, rescaled, spot_weight].into_iter().for_each(Comparison::finish);
-    [rectangle_direction, rectangle_weight, rectangle_pdf].into_iter().for_each(Comparison::finish);
+    [rectangle_direction, rectangle_weight, rectangle_pdf, met_distance].into_iter().for_each(Comparison::finish);
+    assert!(seen.iter().all(|count| *count > 500), "lamps are met and missed: {seen:?}");
 }
 
 #[test]

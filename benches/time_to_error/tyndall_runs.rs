@@ -11,11 +11,11 @@ use tyndall::gpu::{Device, DeviceChoice, Renderer};
 use tyndall::image::Image;
 use tyndall::pack::Packed;
 use tyndall::pack::layout::MEDIUM_SEALED;
-use tyndall::pilot;
 use tyndall::render::session::{self, Options};
 use tyndall::render::{Backend, picture};
 use tyndall::scene::{Crop, Scene};
 use tyndall::seen::{Seen, with_seen};
+use tyndall::{guide, pilot};
 
 use super::arguments::Arguments;
 use super::case::{Case, load_scene};
@@ -44,11 +44,13 @@ pub enum Lever {
     NoEquiangular,
     /// With light sampled in media that no shadow ray leaves.
     NoSeals,
+    /// Without probes through glass.
+    NoGuides,
 }
 
 impl Lever {
     /// All of them, the whole program first.
-    pub const LEVERS: [Lever; 8] = [
+    pub const LEVERS: [Lever; 9] = [
         Lever::All,
         Lever::NoPilot,
         Lever::NoSharing,
@@ -57,6 +59,7 @@ impl Lever {
         Lever::NoImmediates,
         Lever::NoEquiangular,
         Lever::NoSeals,
+        Lever::NoGuides,
     ];
 
     /// Its name in the results.
@@ -70,6 +73,7 @@ impl Lever {
             Lever::NoImmediates => "all in the tree",
             Lever::NoEquiangular => "no equiangular",
             Lever::NoSeals => "no seals",
+            Lever::NoGuides => "no guides",
         }
     }
 
@@ -81,7 +85,7 @@ impl Lever {
             Lever::NoSeen => packed.primitives.iter().any(|primitive| primitive.light != 0),
             Lever::NoImmediates => packed.immediate_count > 0,
             Lever::NoEquiangular => packed.features.equiangular,
-            Lever::NoSeals => packed.features.sealed,
+            Lever::NoSeals | Lever::NoGuides => packed.features.sealed,
         };
         let mut packed = match self {
             Lever::NoImmediates => packed.with_immediates(0),
@@ -146,6 +150,9 @@ impl OurDevice {
         let Some(mut packed) = lever.pull(packed) else { return Ok(None) };
         let (begin, begin_cpu) = (Instant::now(), cpu_time());
         let mut seen = None;
+        if lever != Lever::NoGuides {
+            guide::run(&mut packed);
+        }
         if lever != Lever::NoPilot {
             pilot::run(&mut packed, lever != Lever::NoSharing);
             seen = if lever == Lever::NoSeen { None } else { Seen::find(&mut packed) };

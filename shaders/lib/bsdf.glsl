@@ -199,6 +199,21 @@ BsdfSample sample_smooth_dielectric(Surface surface, vec3 wi, float lobe) {
     return BsdfSample(vec3(-wi.xy / eta, cos_t), surface.transmittance / (eta * eta), 0.0, eta);
 }
 
+// Whether it is glass without roughness, but no thin pane.
+bool is_smooth_glass(Surface surface) {
+    return HAS_DIELECTRIC && bsdf_kind(surface) == BSDF_DIELECTRIC && surface.alpha == 0.0 && (surface.flags & SURFACE_THIN) == 0u;
+}
+
+// What smooth glass mirrors of light from outside, and the probability with which sample_bsdf goes that way; 0 for all else.
+BsdfValue mirrored(Surface surface, vec3 wi) {
+    if (!is_smooth_glass(surface) || wi.z <= 0.0) {
+        return BsdfValue(vec3(0.0), 0.0);
+    }
+    float unused;
+    float f = fresnel_dielectric(wi.z, surface.eta, unused);
+    return BsdfValue(surface.specular * f, f);
+}
+
 // A direction with the weight of what is evaluated there; none without a density.
 BsdfSample weighted_sample(BsdfSample found, BsdfValue value) {
     return value.pdf <= 0.0 ? BsdfSample(vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0, 1.0) : BsdfSample(found.direction, value.value / value.pdf, value.pdf, found.eta);

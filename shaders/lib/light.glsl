@@ -151,6 +151,18 @@ float rectangle_light_pdf(Light light, vec3 point, float distance, float cos_lig
     return solid_angle > 0.0 ? 1.0 / solid_angle : area_pdf(light.area, distance, cos_light);
 }
 
+// What a plane light sends to a point from exactly this direction.
+LightSample plane_light_in(Light light, vec3 point, vec3 direction) {
+    vec3 across = cross(light.edge_1, light.edge_2);
+    float cos_light = -dot(direction, light.normal);
+    float distance = dot(point - light.origin, light.normal) / cos_light;
+    vec3 offset = point + direction * distance - light.origin;
+    vec2 v = vec2(dot(cross(offset, light.edge_2), across), dot(cross(light.edge_1, offset), across)) / dot(across, across);
+    bool within = light.kind == LIGHT_TRIANGLE ? v.x + v.y <= 1.0 : max(v.x, v.y) <= 1.0;
+    bool seen = cos_light > 0.0 && distance > 0.0 && min(v.x, v.y) >= 0.0 && within;
+    return LightSample(direction, seen ? distance : 0.0, seen ? light.radiance : vec3(0.0), 1.0);
+}
+
 // 1 - cos of half the angle under which a sphere is seen from outside, without cancellation.
 float sphere_one_minus_cos(float radius, float center_distance) {
     float sin_squared = min(radius * radius / (center_distance * center_distance), 1.0);
@@ -184,6 +196,18 @@ LightSample sample_sphere_light(Light light, vec3 point, vec2 u) {
     result.distance = max(inside ? along + half_chord : along - half_chord, 0.0);
     result.weight = light.radiance / result.pdf;
     return result;
+}
+
+// What a sphere sends to a point from exactly this direction.
+LightSample sphere_light_in(Light light, vec3 point, vec3 direction) {
+    vec3 to_center = light.origin - point;
+    float radius = light.edge_1.x, along = dot(to_center, direction);
+    vec3 closest = to_center - along * direction;
+    float squared = radius * radius - dot(closest, closest);
+    bool inside = dot(to_center, to_center) < radius * radius, inwards = light.edge_1.y < 0.0;
+    bool seen = squared > 0.0 && inside == inwards && (inside || along > 0.0);
+    float half_chord = sqrt(max(squared, 0.0));
+    return LightSample(direction, seen ? max(inside ? along + half_chord : along - half_chord, 0.0) : 0.0, seen ? light.radiance : vec3(0.0), 1.0);
 }
 
 float sphere_light_pdf(float radius, float center_distance) {

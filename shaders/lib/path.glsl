@@ -19,6 +19,7 @@
 #include "lib/path_flight.glsl"
 #include "lib/path_shadow.glsl"
 #include "lib/path_share.glsl"
+#include "lib/path_probe.glsl"
 #include "lib/camera.glsl"
 #include "lib/filter.glsl"
 #include "lib/film.glsl"
@@ -80,6 +81,8 @@ void path_start(inout Path path, uvec2 pixel) {
     path.segment = 0u;
     path.depth = 0u;
     path.pdf = 0.0;
+    path.guide_pdf = 0.0;
+    path.probe = false;
     path.scattered_pdf = 0.0;
     path.alive = true;
     path.eta_scale = 1.0;
@@ -142,9 +145,19 @@ void scatter(inout Path path, Vertex vertex) {
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
-    bool sealed = HAS_SEALED && vertex.in_medium && (MEDIUM(valid_medium(path.medium)).grids & MEDIUM_SEALED) != 0u;
+    bool sealed = HAS_SEALED && (MEDIUM(valid_medium(path.medium)).grids & MEDIUM_SEALED) != 0u
+        && (vertex.in_medium || (HAS_GUIDES && (vertex.surface.flags & SURFACE_ORIENTED) == 0u));
     bool samples_light = !sealed && (vertex.in_medium || !HAS_LOBES || bsdf_has_density(vertex.surface));
-    path.shadow = samples_light && sample_light(path, vertex, aim, u.xy, u.zw);
+    BsdfValue mirror = BsdfValue(vec3(0.0), 0.0);
+    if (HAS_DIELECTRIC && HAS_AREA_LIGHTS && HAS_LIGHT_SAMPLING && !vertex.in_medium) {
+        mirror = mirrored(vertex.surface, vertex.incident);
+    }
+    if (HAS_DIELECTRIC && mirror.pdf > 0.0) {
+        path.shadow = sample_mirrored(path, vertex, mirror, u.x);
+        pdf = goes_through(vertex, next.direction) ? 0.0 : -mirror.pdf;
+    } else {
+        path.shadow = samples_light && sample_light(path, vertex, aim, u.xy, u.zw);
+    }
     path.next_direction = next.direction;
     path.next_medium = medium_towards(vertex, path.medium, next.direction);
     if (HAS_GRIDS && path.shadow) {
@@ -155,14 +168,28 @@ void scatter(inout Path path, Vertex vertex) {
         path.passed = 1.0;
         path.collisions = 0u;
     }
+    vec3 arriving = path.throughput;
     path.throughput *= next.weight;
-    path.pdf = sealed ? 0.0 : pdf; // light that scattering finds counts in full
+    Guide guide = Guide(vec3(0.0), 0.0, 0.0);
+    if (HAS_GUIDES) {
+        bool bends = path.guide_pdf > 0.0 && !vertex.in_medium && is_smooth_glass(vertex.surface) && goes_through(vertex, next.direction);
+        if (bends) {
+            pdf = path.pdf * passing_probability(vertex);
+        } else if (sealed) {
+            guide = find_guide(path, vertex.point);
+        }
+        path.guide_pdf = guide.chance > 0.0 ? guide_pdf(guide, next.direction) : (bends ? path.guide_pdf : 0.0);
+    }
+    path.pdf = sealed && guide.chance == 0.0 ? 0.0 : pdf; // light that only scattering finds counts in full
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
     if (!is_finite(path.throughput)) {
         // The sample is lost, and must be seen to be: no comparison may drop it.
         path.radiance += path.throughput;
         path.alive = false;
+    }
+    if (HAS_GUIDES && path.alive && u.x < guide.chance) {
+        send_probe(path, vertex, guide, arriving, vec2(u.x / guide.chance, u.y));
     }
 }
 
@@ -265,8 +292,11 @@ bool meet(inout Path path, Hit hit, DenseWay through, out Vertex vertex) {
 
     Medium medium;
     FlightEnd end = FlightEnd(false, 0.0, vec3(0.0), 0.0);
+    bool probe = HAS_GUIDES && path.probe;
     if (HAS_MEDIA) {
         medium = MEDIUM(valid_medium(path.medium));
+    }
+    if (HAS_MEDIA && !probe) {
         bool voxels = HAS_VOXELS && (medium.grids & MEDIUM_VOXELS) != 0u;
         if (HAS_VOXELS && voxels) {
             if (HAS_SHARING && path.sharing == 1u && path.depth == 1u) {
@@ -311,7 +341,7 @@ bool meet(inout Path path, Hit hit, DenseWay through, out Vertex vertex) {
         vertex.albedo = HAS_GRIDS ? end.weight * albedo_factor(medium, vertex.point) : end.weight;
         return true;
     }
-    if (HAS_ABSORBING && HAS_CHROMATIC && medium.flight_share == 0.0) {
+    if (HAS_ABSORBING && HAS_CHROMATIC && medium.flight_share == 0.0 && !probe) {
         pass_absorbing(path, medium.sigma_t * (t - path.t_min));
         if (!path.alive) {
             return false;
@@ -321,7 +351,7 @@ bool meet(inout Path path, Hit hit, DenseWay through, out Vertex vertex) {
         float way = HAS_GRIDS ? end.dense : t - path.t_min;
         float sigma = HAS_CHROMATIC ? channel_of(medium.sigma_t, path.channel) : medium.sigma_t.x;
         path.tau_left -= way * (HAS_ABSORBING ? medium.flight_share * sigma : sigma);
-        if (HAS_ABSORBING && medium.flight_share < 1.0) {
+        if (HAS_ABSORBING && medium.flight_share < 1.0 && !probe) {
             float left = rare_passage_weight(medium, way);
             path.throughput *= left;
             path.absorbed *= left;
@@ -359,6 +389,9 @@ bool meet(inout Path path, Hit hit, DenseWay through, out Vertex vertex) {
         path.anchor = point;
         cross_surface(path, surface, hit);
         return false;
+    }
+    if (HAS_GUIDES && path.guide_pdf > 0.0) {
+        path.pdf *= survival(path);
     }
     path.throughput = survived_throughput(path);
     bool back = dot(path.direction, normal) > 0.0;
@@ -438,6 +471,36 @@ void path_light(inout Path path, Hit hit, DenseWay through) {
     path.shadow = false;
 }
 
+// The path has come to a vertex: it is kept for others, the path may end, or it scatters. Returns whether it goes on.
+bool leave(inout Path path, Vertex vertex) {
+    bool leaves = true;
+    if (HAS_SHARING && path.depth < 2u) {
+        share_vertex(path, vertex);
+    }
+    if (HAS_PILOT && path.depth > 0u) {
+        leaves = goes_on(path, vertex);
+    }
+    if (HAS_SHARING && HAS_HENYEY_GREENSTEIN && path.sharing == 2u && path.depth == 1u) {
+        share_ended(path);
+    }
+    if (leaves) {
+        scatter(path, vertex);
+    }
+    if (HAS_SHARING && path.sharing == 2u && path.depth == 2u) {
+        path.shared_direction = path.next_direction;
+    }
+    return leaves;
+}
+
+// Takes a probe further, which has come to a vertex or not. Returns whether it has ended, and the path goes on.
+bool answer_probe(inout Path path, Vertex vertex, bool arrived) {
+    if (arrived ? refract_probe(path, vertex) : path.alive) {
+        return false;
+    }
+    end_probe(path);
+    return true;
+}
+
 // Answers the ray that the path asked for.
 void path_answer(inout Path path, Hit hit) {
     DenseWay through = DenseWay(0.0, 0.0, false);
@@ -450,23 +513,13 @@ void path_answer(inout Path path, Hit hit) {
     } else {
         Vertex vertex;
         leaves = meet(path, hit, through, vertex);
-        if (HAS_SHARING && leaves && path.depth < 2u) {
-            share_vertex(path, vertex);
-        }
-        if (HAS_PILOT && leaves && path.depth > 0u) {
-            leaves = goes_on(path, vertex);
-        }
-        if (HAS_SHARING && HAS_HENYEY_GREENSTEIN && path.sharing == 2u && path.depth == 1u) {
-            share_ended(path);
-        }
-        if (leaves) {
-            scatter(path, vertex);
-        }
-        if (HAS_SHARING && path.sharing == 2u && path.depth == 2u) {
-            path.shared_direction = path.next_direction;
+        if (HAS_GUIDES && path.probe) {
+            leaves = answer_probe(path, vertex, leaves);
+        } else if (leaves) {
+            leaves = leave(path, vertex);
         }
     }
-    if (leaves && path.alive && !path.shadow) {
+    if (leaves && path.alive && !path.shadow && !(HAS_GUIDES && path.probe)) {
         next_segment(path);
     }
 }

@@ -17,11 +17,19 @@ float power_heuristic(float ratio) {
 // Weight of a direction found by scattering that light sampling finds with density light_pdf. Scattering finds the light only if the flight
 // survives, so its probability to do so is part of the density.
 float scattering_mis_weight(Path path, float survival, float light_pdf) {
-    float found = HAS_MIS ? path.pdf * survival : 0.0;
+    float found = HAS_MIS ? abs(path.pdf) * survival : 0.0;
     if (path.pdf == 0.0 || light_pdf == 0.0) {
         return 1.0;
     }
     return found > light_pdf ? power_heuristic(light_pdf / found) : 1.0 - power_heuristic(found / light_pdf);
+}
+
+// The same where the density is that of light sampling, or of a guide: of directions that glass bends since, it alone is known. A probe has
+// what is left.
+float emission_weight(Path path, float light_pdf) {
+    bool guided = HAS_GUIDES && path.guide_pdf > 0.0;
+    float weight = scattering_mis_weight(path, survival(path), guided ? path.guide_pdf : light_pdf);
+    return HAS_GUIDES && path.probe ? 1.0 - weight : weight;
 }
 
 bool emitters_seen(Path path) {
@@ -58,8 +66,8 @@ void add_sky(inout Path path) {
             radiance = sky_radiance(sky, uv);
             pdf = sky_pdf(sky, uv.x, direction.y);
         }
-        float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * pdf : 0.0;
-        path.radiance += survived_throughput(path) * radiance * scattering_mis_weight(path, survival(path), light_pdf);
+        float light_pdf = HAS_LIGHT_SAMPLING && path.pdf >= 0.0 ? light.probability * pdf : 0.0;
+        path.radiance += survived_throughput(path) * radiance * emission_weight(path, light_pdf);
     }
 }
 
@@ -104,9 +112,10 @@ void add_emission(inout Path path, Primitive primitive, float t, vec3 normal) {
     } else if (HAS_PLANE_LIGHTS) {
         pdf = area_pdf(light.area, t, cos_light);
     }
-    float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * pdf : 0.0;
+    // In a mirror's direction the choice of the light alone counts.
+    float light_pdf = HAS_LIGHT_SAMPLING ? light.probability * (path.pdf < 0.0 ? 1.0 : pdf) : 0.0;
     vec3 radiance = light.radiance * slide_color(light, path.origin + path.direction * t, -path.direction);
-    path.radiance += survived_throughput(path) * radiance * scattering_mis_weight(path, survival(path), light_pdf);
+    path.radiance += survived_throughput(path) * radiance * emission_weight(path, light_pdf);
 }
 
 // Adds what voxels emit along the flight through a homogeneous medium: one point stands for the way through them.
@@ -146,9 +155,41 @@ void add_medium_emission(inout Path path, Medium medium, float way, bool ended) 
     if (HAS_VOLUME_LIGHTS && HAS_LIGHT_SAMPLING && medium.light != 0u) {
         // Of the direction alone: whatever lies on the way, light sampling has the same density for all of its points.
         Light light = LIGHT(medium.light - 1u);
-        mis_weight = scattering_mis_weight(path, 1.0, light.probability * volume_light_pdf(light, path.origin, path.direction));
+        float pdf = path.pdf < 0.0 ? 0.0 : volume_light_pdf(light, path.origin, path.direction);
+        mis_weight = scattering_mis_weight(path, 1.0, light.probability * pdf);
     }
     path.radiance += path.throughput * medium.emission * length_rgb * mis_weight;
+}
+
+// What a lamp sends to a vertex from exactly this direction, if it is of a kind that has a surface.
+LightSample lamp_in(Light light, vec3 point, vec3 direction) {
+    LightSample found = LightSample(direction, 0.0, vec3(0.0), 0.0);
+    if (HAS_SPHERE_LIGHTS && light.kind == LIGHT_SPHERE) {
+        found = sphere_light_in(light, point, direction);
+    } else if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_QUAD || light.kind == LIGHT_RECTANGLE) {
+        found = plane_light_in(light, point, direction);
+    }
+    if (HAS_SLIDES && light.texture != 0u && max_component(found.weight) > 0.0) {
+        found.weight *= slide_color(light, point + direction * found.distance, -direction);
+    }
+    return found;
+}
+
+// Sets up a shadow ray to a lamp that a surface mirrors (see mirrored()). A path would see few of them, for it seldom goes that way where glass
+// mirrors little. Returns whether there is anything to ask for.
+bool sample_mirrored(inout Path path, Vertex vertex, BsdfValue mirror, float u) {
+    uint index = choose_light(u);
+    Light light = LIGHT(index);
+    path.direction = from_surface_frame(vertex.tangent, vertex.axis, reflect_z(vertex.incident));
+    LightSample found = lamp_in(light, vertex.point, path.direction);
+    path.t_max = found.distance;
+    path.light = index;
+    path.light_channels = path.throughput * mirror.value;
+    path.light_weight = path.light_channels * found.weight / light.probability;
+    path.pdf_ratio = HAS_MIS ? mirror.pdf / light.probability : 0.0;
+    path.light_medium = path.medium;
+    path.origin = offset_origin(path, path.direction);
+    return sides_agree(vertex, vertex.incident.z, path.direction) && (max_component(path.light_weight) > 0.0 || !is_finite(path.light_weight));
 }
 
 // Chooses a light and a point on it by u, and where a sampler has more to decide, by `decision`, and sets up the shadow ray. Returns whether there is anything to ask for.

@@ -36,7 +36,7 @@ struct Path {
     vec3 radiance;
     uint segment;           // counts the random numbers' sets
     uint depth;             // scattering events so far
-    float pdf;              // density per solid angle of `direction`; 0 for a camera ray
+    float pdf;              // density per solid angle of `direction`; 0 for a camera ray; of a mirror that light sampling knows, minus its probability
     float scattered_pdf;    // the same by scattering alone
     bool alive;
     // The medium and the flight through it. Scalars serve gray media, vectors chromatic ones.
@@ -68,6 +68,17 @@ struct Path {
     vec3 normal;            // only valid when offset > 0
     uint left;              // the triangle on which the vertex lies, which its rays cannot meet again; else NONE
     uint next_medium;       // where dielectrics are: the medium of the next segment
+    // Where media are guided: lib/path_probe.glsl.
+    float guide_pdf;        // density of the direction of the last vertex by the guide, where a probe from there is bent like the path; else 0
+    bool probe;             // the ray is a probe's
+    vec3 kept_throughput;   // what the path goes on with
+    float kept_pdf;
+    float kept_guide_pdf;
+    uint kept_depth;
+    vec3 kept_point;
+    vec3 kept_normal;
+    float kept_offset;
+    uint kept_left;
     // Where pixels share paths.
     uint slot;              // of the sample, in the buffer
     uint sharing;           // 1: the first vertex is kept; 2: the second one is, and radiance is that of a throughput of 1 from there
@@ -163,7 +174,7 @@ bool goes_by_lamps(Path path, Medium medium) {
 
 // Distance to the end of the flight with the extinction that holds from t_min on.
 float flight_end(Path path) {
-    if (!HAS_MEDIA) {
+    if (!HAS_MEDIA || (HAS_GUIDES && path.probe)) {
         return path.far_end;
     }
     Medium medium = MEDIUM(valid_medium(path.medium));
@@ -240,6 +251,9 @@ float survival(Path path) {
 }
 
 vec3 survived_throughput(Path path) {
+    if (HAS_GUIDES && path.probe) {
+        return path.throughput * (HAS_CHROMATIC ? exp_minus(path.tau_rgb) : vec3(exp_minus(path.tau)));
+    }
     if (HAS_MEDIA && HAS_CHROMATIC) {
         return path.throughput * survival_weight(channel_weights(path.throughput), path.tau_rgb);
     }

@@ -1,5 +1,6 @@
 // Unit kernel of lib/light.glsl: (point, v), (u, which light, u of the distance to an emitting medium, 0) in; (direction, distance), (weight, density), and
-// (density asked for by what the light is, line of the alias table, rescaled number, whether the line is kept) out.
+// (density asked for by what the light is, line of the alias table, rescaled number, whether the line is kept), and of a
+// lamp in the direction of a point of its plane or near its centre, 1.5 u - 0.25 along its edges, (what it sends, distance) out.
 #version 460
 #include "lib/layout.glsl"
 #include "lib/light.glsl"
@@ -41,7 +42,11 @@ void main() {
     float rescaled = u.x;
     uint line = alias_line(uint(lights.length()), rescaled);
     bool keeps = alias_keeps(lights[line].alias_threshold, rescaled);
-    outputs[3u * i] = vec4(found.direction, found.distance);
-    outputs[3u * i + 1u] = vec4(found.weight, found.pdf);
-    outputs[3u * i + 2u] = vec4(pdf, float(line), rescaled, float(keeps));
+    vec2 v = 1.5 * u - 0.25;
+    vec3 towards = normalize(light.origin + light.edge_1 * v.x + light.edge_2 * v.y - point);
+    LightSample met = light.kind == LIGHT_SPHERE ? sphere_light_in(light, point, towards) : plane_light_in(light, point, towards);
+    outputs[4u * i] = vec4(found.direction, found.distance);
+    outputs[4u * i + 1u] = vec4(found.weight, found.pdf);
+    outputs[4u * i + 3u] = vec4(met.weight, met.distance);
+    outputs[4u * i + 2u] = vec4(pdf, float(line), rescaled, float(keeps));
 }

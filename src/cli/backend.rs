@@ -4,12 +4,12 @@ use std::path::Path;
 
 use tyndall::gpu::{self, Device, DeviceChoice, DeviceDescription};
 use tyndall::pack::Packed;
-use tyndall::pilot;
 use tyndall::reference;
 use tyndall::render::{Backend, BackendError};
 use tyndall::scene::Scene;
 use tyndall::scene::mitsuba::{self, Loaded};
 use tyndall::seen::{Seen, with_seen};
+use tyndall::{guide, pilot};
 
 use super::error::CliError;
 
@@ -30,6 +30,7 @@ pub fn open(
     warn: &mut dyn FnMut(&str),
 ) -> Result<Box<dyn Backend>, CliError> {
     let mut packed = Packed::new(scene, seed).map_err(|error| CliError::Scene(error.to_string()))?;
+    guide::run(&mut packed);
     let mut seen = None;
     if with_pilot {
         // Second moments are those of paths that belong to one pixel and bring all of its light.

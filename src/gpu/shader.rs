@@ -57,6 +57,8 @@ sources! {
     "lib/sky.glsl",
     "lib/texture.glsl",
     "lib/toward_light.glsl",
+    "lib/guide.glsl",
+    "lib/path_probe.glsl",
     "lib/warp.glsl",
     "units/bsdf.comp",
     "units/bvh.comp",
@@ -78,6 +80,7 @@ sources! {
     "units/sky.comp",
     "units/texture.comp",
     "units/toward_light.comp",
+    "units/guide.comp",
     "units/warp.comp",
 }
 

@@ -114,6 +114,8 @@ pub struct Features {
     pub pilot: bool,
     /// A medium that no shadow ray leaves.
     pub sealed: bool,
+    /// Probes bring light into it.
+    pub guides: bool,
     /// Pixels that share their paths: 4 or 8, or 0 where each pixel has only its own.
     pub sharers: u32,
     /// The light of lamps that the camera sees is found apart, for some pixels ([`crate::seen`]).
@@ -223,6 +225,7 @@ impl Features {
             pilot: false,
             sharers: 0,
             seen: false,
+            guides: false,
             sealed: packed.media.iter().any(|medium| medium.grids & MEDIUM_SEALED != 0),
             walk_stack: packed.bvh.stack,
             tree: packed.immediate_count < packed.primitives.len(),
@@ -346,6 +349,7 @@ impl Features {
             ("HAS_TREE", self.tree),
             ("HAS_PILOT", self.pilot),
             ("HAS_SEALED", self.sealed),
+            ("HAS_GUIDES", self.guides),
             ("HAS_SHARING", self.sharers > 0),
             ("HAS_OPEN_FLIGHTS", self.equiangular && self.sharers > 0),
             ("HAS_SEEN", self.seen),

@@ -431,6 +431,14 @@ gpu_struct! {
         pilot_scale: Vec3,
         /// Index of the first number of the pilot's blocks of pixels: of each one over the square of its radiance, and one that fills up.
         first_block: u32,
+        /// Lower corner of the cells of the guides.
+        guide_origin: Vec3,
+        /// Index of the first number of the guides: of each cell the axis and the sharpness of its lobe.
+        first_guide: u32,
+        /// Cells of the guides per unit of length, on each axis.
+        guide_scale: Vec3,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
     }
 }
 
@@ -458,6 +466,8 @@ gpu_struct! {
 
 /// Cells of the pilot on each axis.
 pub const PILOT_CELLS: u32 = 12;
+/// Cells of the guides on each axis.
+pub const GUIDE_CELLS: u32 = 8;
 /// Bit 31 of [`Primitive::surface`].
 pub const PRIMITIVE_BOUNDARY: u32 = 1 << 31;
 /// Bit 30 of [`Primitive::surface`].
@@ -592,6 +602,7 @@ pub fn glsl() -> String {
     .concat();
     let constants = [
         ("PILOT_CELLS", PILOT_CELLS),
+        ("GUIDE_CELLS", GUIDE_CELLS),
         ("PRIMITIVE_BOUNDARY", PRIMITIVE_BOUNDARY),
         ("PRIMITIVE_SPHERE", PRIMITIVE_SPHERE),
         ("SURFACE_TWO_SIDED", SURFACE_TWO_SIDED),

@@ -349,6 +349,7 @@ const EMPTY_FEATURES: Features = Features {
     sharers: 0,
     seen: false,
     sealed: false,
+    guides: false,
     walk_stack: 0,
     tree: true,
 };

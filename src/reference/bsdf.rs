@@ -82,7 +82,8 @@ fn is_ggx(surface: &Surface) -> bool {
     surface.flags & SURFACE_GGX != 0
 }
 
-fn reflect_z(w: DVec3) -> DVec3 {
+/// The mirrored direction.
+pub fn reflect_z(w: DVec3) -> DVec3 {
     DVec3::new(-w.x, -w.y, w.z)
 }
 
@@ -194,7 +195,22 @@ pub fn pane_reflectance(cosine: f64, eta: f64) -> f64 {
     2.0 * f / (1.0 + f)
 }
 
-fn sample_smooth_dielectric(surface: &Surface, wi: DVec3, lobe: f64) -> BsdfSample {
+/// Whether it is glass without roughness, but no thin pane.
+pub fn is_smooth_glass(surface: &Surface) -> bool {
+    bsdf_kind(surface) == BSDF_DIELECTRIC && surface.alpha == 0.0 && surface.flags & SURFACE_THIN == 0
+}
+
+/// What smooth glass mirrors of light from outside, and the probability with which [`sample_bsdf`] goes that way; 0 for all else.
+pub fn mirrored(surface: &Surface, wi: DVec3) -> BsdfValue {
+    if !is_smooth_glass(surface) || wi.z <= 0.0 {
+        return BsdfValue { value: DVec3::ZERO, pdf: 0.0 };
+    }
+    let f = fresnel_dielectric(wi.z, surface.eta).0;
+    BsdfValue { value: surface.specular * f, pdf: f }
+}
+
+/// Reflection or refraction at smooth glass, whose choice `lobe` makes.
+pub fn sample_smooth_dielectric(surface: &Surface, wi: DVec3, lobe: f64) -> BsdfSample {
     let reflection = BsdfSample { direction: reflect_z(wi), weight: surface.specular, ..NO_SAMPLE };
     if surface.flags & SURFACE_THIN != 0 {
         // What gets through is not bent.

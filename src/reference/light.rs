@@ -174,6 +174,25 @@ pub fn rectangle_light_pdf(light: &Light, point: DVec3, distance: f64, cos_light
     if solid_angle > 0.0 { 1.0 / solid_angle } else { area_pdf(light.area, distance, cos_light) }
 }
 
+/// What a plane light sends to a point from exactly this direction.
+pub fn plane_light_in(light: &Light, point: DVec3, direction: DVec3) -> LightSample {
+    let across = light.edge_1.cross(light.edge_2);
+    let cos_light = -direction.dot(light.normal);
+    let distance = (point - light.origin).dot(light.normal) / cos_light;
+    let offset = point + direction * distance - light.origin;
+    let (s, t) = (offset.cross(light.edge_2).dot(across), light.edge_1.cross(offset).dot(across));
+    let v = DVec2::new(s, t) / across.length_squared();
+    let within = if light.kind == LIGHT_TRIANGLE { v.x + v.y <= 1.0 } else { v.max_element() <= 1.0 };
+    let seen = cos_light > 0.0 && distance > 0.0 && v.min_element() >= 0.0 && within;
+    seen_in(light, direction, seen.then_some(distance))
+}
+
+/// A light that is seen in a direction at a distance, or not.
+fn seen_in(light: &Light, direction: DVec3, distance: Option<f64>) -> LightSample {
+    let weight = if distance.is_some() { light.radiance } else { DVec3::ZERO };
+    LightSample { direction, distance: distance.unwrap_or(0.0), weight, pdf: 1.0 }
+}
+
 /// 1 − cos of half the angle under which a sphere is seen from outside.
 pub fn sphere_one_minus_cos(radius: f64, center_distance: f64) -> f64 {
     let sin_squared = (radius * radius / (center_distance * center_distance)).min(1.0);
@@ -204,6 +223,18 @@ pub fn sample_sphere_light(light: &Light, point: DVec3, u: DVec2) -> LightSample
     // From a point of the sphere itself, rounding may find it behind.
     let distance = if inside { along + half_chord } else { along - half_chord }.max(0.0);
     LightSample { direction, distance, weight: light.radiance / pdf, pdf }
+}
+
+/// What a sphere sends to a point from exactly this direction.
+pub fn sphere_light_in(light: &Light, point: DVec3, direction: DVec3) -> LightSample {
+    let to_center = light.origin - point;
+    let (radius, along) = (light.edge_1.x, to_center.dot(direction));
+    let squared = radius * radius - (to_center - along * direction).length_squared();
+    let inside = to_center.length_squared() < radius * radius;
+    let seen = squared > 0.0 && inside == (light.edge_1.y < 0.0) && (inside || along > 0.0);
+    let half_chord = squared.max(0.0).sqrt();
+    let distance = f64::max(if inside { along + half_chord } else { along - half_chord }, 0.0);
+    seen_in(light, direction, seen.then_some(distance))
 }
 
 /// Density per solid angle with which a sphere is sampled.

@@ -2,26 +2,30 @@
 //! life is described there. What the kernel leaves out where a scene does not need it is always here.
 
 use super::bindings::{Medium, Params, Surface, Tables};
-use super::bsdf::bsdf_has_density;
+use super::bsdf::{BsdfValue, bsdf_has_density, is_smooth_glass, mirrored};
 use super::camera::{camera_direction, focused_direction, lens_point};
 use super::film::{group_offset, group_size};
 use super::filter::sample_filter;
+use super::guide::{Guide, guide_pdf};
 use super::math::{exp_minus_rgb, max_component, minus_log_1m, orthonormal_frame};
 use super::medium::{channel_weights, sample_channel};
 use super::outlook::{Outlook, keep_by_outlook, outlook_cell};
 use super::path_aim::{Pivot, aimed_pdf, find_aim, find_pivot, is_common, sample_next, weighing_pdf};
 use super::path_flight::{
-    albedo_factor, end_dense_flight, end_flight, end_mean_flight, end_voxel_flight, flight_point, flight_side,
-    free_way, rare_collision_weight, rare_passage_weight,
+    FlightEnd, albedo_factor, end_dense_flight, end_flight, end_mean_flight, end_voxel_flight, flight_point,
+    flight_side, free_way, rare_collision_weight, rare_passage_weight,
 };
-use super::path_lights::{add_emission, add_medium_emission, add_sky, emitters_seen, power_heuristic, sample_light};
+use super::path_lights::{
+    add_emission, add_medium_emission, add_sky, emitters_seen, power_heuristic, sample_light, sample_mirrored,
+};
 use super::path_open::{mean_passage, open_factor};
+use super::path_probe::{end_probe, find_guide, goes_through, passing_probability, refract_probe, send_probe};
 pub use super::path_rays::{begin_hit, test_primitive};
 use super::path_shadow::{advance_shadow, cross_surface};
 use super::path_share::{share_aim, share_ended, share_light, share_vertex, sharer_number};
 pub use super::path_state::{Hit, NONE, Path};
 use super::path_state::{
-    INFINITE_DISTANCE, begin_segment, medium_at, open_flight_of, sample_camera, sample_lens, sample_set,
+    INFINITE_DISTANCE, begin_segment, medium_at, open_flight_of, sample_camera, sample_lens, sample_set, survival,
     survived_throughput, vertex_numbers,
 };
 use super::path_surface::{
@@ -152,9 +156,19 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     path.t_min = 0.0;
     path.last = NONE;
     path.far_end = INFINITE_DISTANCE;
-    let sealed = vertex.in_medium && medium_at(tables, path.medium).grids & MEDIUM_SEALED != 0;
+    let enclosed = medium_at(tables, path.medium).grids & MEDIUM_SEALED != 0;
+    let opaque = tables.features.guides && vertex.surface.flags & SURFACE_ORIENTED == 0;
+    let sealed = enclosed && (vertex.in_medium || opaque);
     let samples_light = !sealed && (vertex.in_medium || bsdf_has_density(&vertex.surface));
-    path.shadow = samples_light && sample_light(tables, path, vertex, &aim, u.xy(), u.zw());
+    let looks = tables.features.light_sampling && !vertex.in_medium;
+    let mirror = if looks { mirrored(&vertex.surface, vertex.incident) } else { BsdfValue::default() };
+    let mut pdf = pdf;
+    if mirror.pdf > 0.0 {
+        path.shadow = sample_mirrored(tables, path, vertex, &mirror, u.x);
+        pdf = if goes_through(vertex, next.direction) { 0.0 } else { -mirror.pdf };
+    } else {
+        path.shadow = samples_light && sample_light(tables, path, vertex, &aim, u.xy(), u.zw());
+    }
     path.next_direction = next.direction;
     path.next_medium = medium_towards(tables, vertex, path.medium, next.direction);
     if tables.features.grids && path.shadow {
@@ -165,14 +179,28 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
         path.passed = 1.0;
         path.collisions = 0;
     }
+    let arriving = path.throughput;
     path.throughput *= next.weight;
-    path.pdf = if sealed { 0.0 } else { pdf };
+    let guided = tables.features.guides && sealed;
+    let guide = if guided { find_guide(tables, vertex.point) } else { Guide::default() };
+    let passing = !vertex.in_medium && is_smooth_glass(&vertex.surface) && goes_through(vertex, next.direction);
+    let bends = path.guide_pdf > 0.0 && passing;
+    let pdf = if bends { path.pdf * passing_probability(vertex) } else { pdf };
+    if guide.chance > 0.0 {
+        path.guide_pdf = guide_pdf(&guide, next.direction);
+    } else if !bends {
+        path.guide_pdf = 0.0;
+    }
+    path.pdf = if sealed && guide.chance == 0.0 { 0.0 } else { pdf };
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
     if !path.throughput.is_finite() {
         // The sample is lost, and must be seen to be: no comparison may drop it.
         path.radiance += path.throughput;
         path.alive = false;
+    }
+    if path.alive && u.x < guide.chance {
+        send_probe(tables, path, vertex, &guide, arriving, DVec2::new(u.x / guide.chance, u.y));
     }
 }
 
@@ -276,7 +304,10 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
 
     let medium = *medium_at(tables, path.medium);
     let voxels = medium.grids & MEDIUM_VOXELS != 0;
-    let end = if voxels && path.sharing == 1 && path.depth == 1 {
+    let end = if path.probe {
+        let way = t - path.t_min;
+        FlightEnd { scatters: false, way, weight: DVec3::ONE, dense: way }
+    } else if voxels && path.sharing == 1 && path.depth == 1 {
         end_mean_flight(tables, path, &medium, t)
     } else if voxels {
         let shines = emitters_seen(tables, path);
@@ -317,14 +348,14 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         });
     }
     // The optical depth of the way through the medium since `t_min`.
-    if medium.flight_share == 0.0 && tables.features.chromatic {
+    if medium.flight_share == 0.0 && tables.features.chromatic && !path.probe {
         pass_absorbing(tables, path, medium.sigma_t * end.dense);
         if !path.alive {
             return None;
         }
     } else {
         path.tau_left -= end.dense * medium.flight_share * medium.sigma_t[path.channel as usize];
-        if medium.flight_share < 1.0 {
+        if medium.flight_share < 1.0 && !path.probe {
             let left = rare_passage_weight(&medium, end.dense);
             path.throughput *= left;
             path.absorbed *= left;
@@ -357,6 +388,9 @@ fn meet(tables: &Tables, path: &mut Path, hit: &Hit) -> Option<Vertex> {
         path.anchor = point;
         cross_surface(tables, path, surface, hit);
         return None;
+    }
+    if path.guide_pdf > 0.0 {
+        path.pdf *= survival(tables, path);
     }
     path.throughput = survived_throughput(path);
     let back = path.direction.dot(normal) > 0.0;
@@ -426,6 +460,12 @@ pub fn path_answer(tables: &Tables, path: &mut Path, hit: &Hit) {
 pub fn path_answer_seen(tables: &Tables, path: &mut Path, hit: &Hit, see: impl FnOnce(&Path, &Vertex)) {
     if path.shadow {
         path_light(tables, path, hit);
+    } else if path.probe {
+        let vertex = meet(tables, path, hit);
+        if vertex.map_or(path.alive, |vertex| refract_probe(tables, path, &vertex)) {
+            return;
+        }
+        end_probe(path);
     } else {
         let Some(mut vertex) = meet(tables, path, hit) else { return };
         see(path, &vertex);
@@ -445,7 +485,7 @@ pub fn path_answer_seen(tables: &Tables, path: &mut Path, hit: &Hit, see: impl F
             path.record.rest_direction = path.next_direction;
         }
     }
-    if path.alive && !path.shadow {
+    if path.alive && !path.shadow && !path.probe {
         next_segment(tables, path);
     }
 }

@@ -1,12 +1,12 @@
 //! Mirror of `shaders/lib/path_lights.glsl`: how a path comes to light, by chance or by light sampling.
 
 use super::bindings::{Light, Medium, Primitive, Tables, Texture};
-use super::bsdf::BsdfSample;
+use super::bsdf::{BsdfSample, BsdfValue, reflect_z};
 use super::grid::{clip_to_grid, grid_local, grid_value};
 use super::light::{
-    LightSample, area_pdf, rectangle_light_pdf, sample_directional_light, sample_plane_light, sample_point_light,
-    sample_rectangle_light, sample_sphere_light, sample_spot_light, sample_volume_light, sphere_light_pdf,
-    volume_light_pdf,
+    LightSample, area_pdf, plane_light_in, rectangle_light_pdf, sample_directional_light, sample_plane_light,
+    sample_point_light, sample_rectangle_light, sample_sphere_light, sample_spot_light, sample_volume_light,
+    sphere_light_in, sphere_light_pdf, volume_light_pdf,
 };
 use super::math::max_component;
 use super::medium::{channel_weights, emitting_length, emitting_length_rgb, survival_weight};
@@ -14,12 +14,14 @@ use super::path_aim::{Aim, aimed_pdf, weighing_pdf};
 use super::path_state::{
     EMISSION_SETS, INFINITE_DISTANCE, Path, choose_light, sample_set, survival, survived_throughput,
 };
-use super::path_vertex::{Vertex, eval_scattering, medium_towards, offset_origin, sample_scattering};
+use super::path_vertex::{
+    Vertex, eval_scattering, from_surface_frame, medium_towards, offset_origin, sample_scattering, sides_agree,
+};
 use super::sky::{SKY_STEPS, SkySample, sample_sky, sky_pdf, sky_radiance, sky_uv};
 use super::texture::eval_texture;
 use crate::pack::layout::{
-    LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_SPOT,
-    LIGHT_TEXTURE_SHIFT, LIGHT_VOLUME, MEDIUM_EMISSION_GRID,
+    LIGHT_CONSTANT, LIGHT_DIRECTIONAL, LIGHT_ENVMAP, LIGHT_POINT, LIGHT_QUAD, LIGHT_RECTANGLE, LIGHT_SPHERE,
+    LIGHT_SPOT, LIGHT_TEXTURE_SHIFT, LIGHT_TRIANGLE, LIGHT_VOLUME, MEDIUM_EMISSION_GRID,
 };
 use glam::{DVec2, DVec3};
 
@@ -33,11 +35,19 @@ pub fn power_heuristic(ratio: f64) -> f64 {
 /// Weight of a direction found by scattering that light sampling finds with density `light_pdf`. Scattering finds the light only if the
 /// flight survives, so its probability to do so is part of the density.
 pub fn scattering_mis_weight(tables: &Tables, path: &Path, survival: f64, light_pdf: f64) -> f64 {
-    let found = if tables.features.mis { path.pdf * survival } else { 0.0 };
+    let found = if tables.features.mis { path.pdf.abs() * survival } else { 0.0 };
     if path.pdf == 0.0 || light_pdf == 0.0 {
         return 1.0;
     }
     if found > light_pdf { power_heuristic(light_pdf / found) } else { 1.0 - power_heuristic(found / light_pdf) }
+}
+
+/// The same where the density is that of light sampling, or of a guide: of directions that glass bends since, it alone is known. A probe
+/// has what is left.
+fn emission_weight(tables: &Tables, path: &Path, light_pdf: f64) -> f64 {
+    let known = if path.guide_pdf > 0.0 { path.guide_pdf } else { light_pdf };
+    let weight = scattering_mis_weight(tables, path, survival(tables, path), known);
+    if path.probe { 1.0 - weight } else { weight }
 }
 
 /// Whether light that arrives by chance counts.
@@ -76,9 +86,9 @@ pub fn add_sky(tables: &Tables, path: &mut Path) {
             // Light sampling takes the constant light's directions from the same scattering function (see `sample_light`).
             None => (light.radiance, path.scattered_pdf),
         };
-        let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
-        let weight = scattering_mis_weight(tables, path, survival(tables, path), light_pdf);
-        path.radiance += survived_throughput(path) * radiance * weight;
+        let known = tables.features.light_sampling && path.pdf >= 0.0;
+        let light_pdf = if known { light.probability * pdf } else { 0.0 };
+        path.radiance += survived_throughput(path) * radiance * emission_weight(tables, path, light_pdf);
     }
 }
 
@@ -121,8 +131,10 @@ pub fn add_emission(tables: &Tables, path: &mut Path, primitive: &Primitive, t: 
         LIGHT_RECTANGLE => rectangle_light_pdf(light, path.point, t, cos_light),
         _ => area_pdf(light.area, t, cos_light),
     };
+    // In a mirror's direction the choice of the light alone counts.
+    let pdf = if path.pdf < 0.0 { 1.0 } else { pdf };
     let light_pdf = if tables.features.light_sampling { light.probability * pdf } else { 0.0 };
-    let weight = scattering_mis_weight(tables, path, survival(tables, path), light_pdf);
+    let weight = emission_weight(tables, path, light_pdf);
     let radiance = light.radiance * slide_color(tables, light, path.origin + path.direction * t, -path.direction);
     path.radiance += survived_throughput(path) * radiance * weight;
 }
@@ -163,10 +175,41 @@ pub fn add_medium_emission(tables: &Tables, path: &mut Path, medium: &Medium, wa
     if tables.features.light_sampling && medium.light != 0 {
         // Of the direction alone: whatever lies on the way, light sampling has the same density for all of its points.
         let light = &tables.lights[medium.light as usize - 1];
-        let light_pdf = light.probability * volume_light_pdf(light, path.origin, path.direction);
+        let pdf = if path.pdf < 0.0 { 0.0 } else { volume_light_pdf(light, path.origin, path.direction) };
+        let light_pdf = light.probability * pdf;
         mis_weight = scattering_mis_weight(tables, path, 1.0, light_pdf);
     }
     path.radiance += path.throughput * medium.emission * length * mis_weight;
+}
+
+/// What a lamp sends to a vertex from exactly this direction, if it is of a kind that has a surface.
+fn lamp_in(tables: &Tables, light: &Light, point: DVec3, direction: DVec3) -> LightSample {
+    let mut found = match light.kind {
+        LIGHT_SPHERE => sphere_light_in(light, point, direction),
+        LIGHT_TRIANGLE | LIGHT_QUAD | LIGHT_RECTANGLE => plane_light_in(light, point, direction),
+        _ => LightSample { direction, distance: 0.0, weight: DVec3::ZERO, pdf: 0.0 },
+    };
+    if light.texture != 0 && max_component(found.weight) > 0.0 {
+        found.weight *= slide_color(tables, light, point + direction * found.distance, -direction);
+    }
+    found
+}
+
+/// Sets up a shadow ray to a lamp that a surface mirrors ([`super::bsdf::mirrored`]). Returns whether there is anything to ask for.
+pub fn sample_mirrored(tables: &Tables, path: &mut Path, vertex: &Vertex, mirror: &BsdfValue, mut u: f64) -> bool {
+    let index = choose_light(tables, &mut u);
+    let light = &tables.lights[index as usize];
+    path.direction = from_surface_frame(vertex.tangent, vertex.axis, reflect_z(vertex.incident));
+    let found = lamp_in(tables, light, vertex.point, path.direction);
+    path.t_max = found.distance;
+    path.light = index;
+    path.light_channels = path.throughput * mirror.value;
+    path.light_weight = path.light_channels * found.weight / light.probability;
+    path.pdf_ratio = if tables.features.mis { mirror.pdf / light.probability } else { 0.0 };
+    path.light_medium = path.medium;
+    path.origin = offset_origin(path, path.direction);
+    let arrives = max_component(path.light_weight) > 0.0 || !path.light_weight.is_finite();
+    sides_agree(vertex, vertex.incident.z, path.direction) && arrives
 }
 
 /// Chooses a light and a point on it by `u`, and where a sampler has more to decide, by `decision`, and sets up the shadow ray. Returns whether there is anything to ask for.

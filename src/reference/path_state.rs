@@ -6,6 +6,7 @@ use super::light::{alias_keeps, alias_line};
 use super::math::{exp_minus_rgb, minus_log_1m};
 use super::medium::{channel_weights, free_flight, sample_channel, survival_probability, survival_weight};
 use super::path_open::{OpenFlight, open_flight};
+use super::path_probe::Kept;
 use super::path_share::Record;
 use super::sampler::{group_index, group_seed, half_index, half_seed, lens_key, point_index, set_key, shifted_point};
 use crate::pack::layout::{self, MEDIUM_DENSITY, MEDIUM_VOXELS};
@@ -64,10 +65,16 @@ pub struct Path {
     pub segment: u32,
     /// Scattering events so far.
     pub depth: u32,
-    /// Density per solid angle of `direction`; 0 for a camera ray.
+    /// Density per solid angle of `direction`; 0 for a camera ray; of a mirror that light sampling knows, minus its probability.
     pub pdf: f64,
     /// The same by scattering alone.
     pub scattered_pdf: f64,
+    /// Density of the direction of the last vertex by its guide, where a probe from there is bent like the path; else 0.
+    pub guide_pdf: f64,
+    /// The ray is a probe's ([`super::path_probe`]).
+    pub probe: bool,
+    /// What the path goes on with behind the probe.
+    pub kept: Kept,
     /// Where pixels share paths: what is kept of this one.
     pub record: Record,
     /// 1: the first vertex is kept; 2: the second one is, and radiance is that of a throughput of 1 from there.
@@ -224,7 +231,7 @@ pub fn goes_by_lamps(path: &Path, medium: &Medium) -> bool {
 /// Distance to the end of the flight with the extinction that holds from `t_min` on.
 pub fn flight_end(tables: &Tables, path: &Path) -> f64 {
     let medium = medium_at(tables, path.medium);
-    if medium.grids & (MEDIUM_VOXELS | MEDIUM_DENSITY) != 0 {
+    if path.probe || medium.grids & (MEDIUM_VOXELS | MEDIUM_DENSITY) != 0 {
         return path.far_end;
     }
     let flight = if path.open {
@@ -285,6 +292,9 @@ pub fn survival(tables: &Tables, path: &Path) -> f64 {
 
 /// The throughput with the weight of a flight that got as far as it did.
 pub fn survived_throughput(path: &Path) -> DVec3 {
+    if path.probe {
+        return path.throughput * exp_minus_rgb(path.tau_rgb);
+    }
     path.throughput * survival_weight(channel_weights(path.throughput), path.tau_rgb)
 }
 

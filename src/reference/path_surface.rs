@@ -22,7 +22,8 @@ pub struct Place {
     pub barycentric: DVec2,
 }
 
-fn is_sphere(primitive: &Primitive) -> bool {
+/// Whether it is a sphere, else a triangle.
+pub fn is_sphere(primitive: &Primitive) -> bool {
     primitive.surface & PRIMITIVE_SPHERE != 0
 }
 

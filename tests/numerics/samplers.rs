@@ -175,7 +175,7 @@ fn equiangular_distances_are_drawn_as_their_density_says() {
 /// Asks the kernel of lights; the outputs come in threes.
 fn ask_lights(lights: &[Light], inputs: &[[f32; 4]]) -> Vec<[f32; 4]> {
     let count = inputs.len() / 2;
-    run("light", inputs, &[bytemuck::cast_slice(lights)], count, 3 * count)
+    run("light", inputs, &[bytemuck::cast_slice(lights)], count, 4 * count)
 }
 
 fn volume(center: Vec3, radius: f32) -> Light {
@@ -206,7 +206,7 @@ fn emitting_volumes_are_sampled_as_by_the_reference() {
     let [mut direction, mut distance, mut weight, mut asked, mut pdf] = names.map(comparison);
     let outputs = ask_lights(&lights, &inputs);
     let mut inside = 0;
-    for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(4)) {
         let (point, u) = (widen(&input[0][..3]), DVec2::new(f64::from(input[1][0]), f64::from(input[0][3])));
         let light = &wide[input[1][1] as usize];
         let case = format!("{input:?}");
@@ -247,7 +247,7 @@ fn emitting_volumes_give_the_fluence_of_the_closed_form() {
             })
             .collect();
         let outputs = ask_lights(&[light], &inputs);
-        let found = outputs.chunks(3).map(|output| f64::from(output[1][0])).sum::<f64>() / f64::from(side * side);
+        let found = outputs.chunks(4).map(|output| f64::from(output[1][0])).sum::<f64>() / f64::from(side * side);
         let (r, d) = (0.5, point.distance(DVec3::new(0.2, 0.1, 0.0).as_vec3().as_dvec3()));
         let expected = 3.0 * 2.0 * PI * (r - (d * d - r * r) / (2.0 * d) * ((d + r) / (d - r)).ln());
         let agrees = |found: f64| (found / expected - 1.0).abs() < 2e-3;
@@ -329,7 +329,7 @@ fn lights_at_the_ends_of_their_numbers_and_at_impossible_points() {
         let usable = (direction.length() - 1.0).abs() < 1e-5 && output[0][3] >= 0.0 && output[0][3].is_finite();
         weight.is_finite() && weight.min_element() >= 0.0 && pdf.is_finite() && pdf >= 0.0 && (usable || !sent)
     };
-    for (input, output) in inputs.chunks(2).zip(outputs.chunks(3)) {
+    for (input, output) in inputs.chunks(2).zip(outputs.chunks(4)) {
         assert!(check(output), "{input:?}: {output:?}");
     }
     let mut broken = outputs[..3].to_vec();
