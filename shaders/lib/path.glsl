@@ -8,7 +8,7 @@
 //                       nothing within the flight: scatter in the medium                           -> 4
 //                       a surface: add what it emits, reflect                                      -> 4
 //                       nothing at all: add what comes from infinitely far, end
-//   4. scatter          choose a light, ask for a shadow ray; sample the next direction
+//   4. scatter          choose a light, ask for a shadow ray, or for a probe behind glass; sample the next direction
 //   5. (traversal)      everything along the shadow ray, in any order
 //   6. path_light       add the light that got through
 //   7. next_segment     roulette, a free flight -> 2
@@ -180,7 +180,7 @@ void scatter(inout Path path, Vertex vertex) {
         }
         path.guide_pdf = guide.chance > 0.0 ? guide_pdf(guide, next.direction) : (bends ? path.guide_pdf : 0.0);
     }
-    path.pdf = sealed && guide.chance == 0.0 ? 0.0 : pdf; // light that only scattering finds counts in full
+    path.pdf = sealed && path.guide_pdf == 0.0 ? 0.0 : pdf; // light that only scattering finds counts in full
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
     if (!is_finite(path.throughput)) {

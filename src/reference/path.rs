@@ -191,7 +191,7 @@ fn scatter(tables: &Tables, path: &mut Path, vertex: &Vertex) {
     } else if !bends {
         path.guide_pdf = 0.0;
     }
-    path.pdf = if sealed && guide.chance == 0.0 { 0.0 } else { pdf };
+    path.pdf = if sealed && path.guide_pdf == 0.0 { 0.0 } else { pdf };
     path.eta_scale *= next.eta * next.eta;
     path.alive = max_component(path.throughput) > 0.0;
     if !path.throughput.is_finite() {
