@@ -21,7 +21,7 @@ void main() {
     uint count = push.work.sample_count, samples_in_tile = TILE * TILE * count;
     uint first_slot = gl_WorkGroupID.x * samples_in_tile;
     uvec2 size = uvec2(params.crop_width, params.crop_height);
-    uvec2 corner = tile_pixel(push.work.first_tile + gl_WorkGroupID.x, 0u, params.crop_width + group_margin(SHARERS).x);
+    uvec2 corner = tile_pixel(TILE_NUMBER(gl_WorkGroupID.x), 0u, params.crop_width + group_margin(SHARERS).x);
     // The sample whose first vertex is connected, and the number of the next pixel of its group.
     uint slot = gl_LocalInvocationIndex, of_pixel = 0u, next = 0u, own = 0u, pairs = 0u, to = 0u;
     // Its place in the tile, and the pixel of the tile's first place.

@@ -27,10 +27,8 @@ void main() {
         next_sample = WORKGROUP;
     }
     barrier();
-    // Neighbouring tiles cost alike: a step coprime to their number spreads them over the processors.
-    uint turn = (gl_WorkGroupID.x * push.work.tile_step) % push.work.tile_count;
-    uint tile = push.work.first_tile + turn;
-    uvec2 corner = tile_pixel(tile, 0u, params.crop_width + group_margin(SHARERS).x);
+    uint turn = gl_WorkGroupID.x;
+    uvec2 corner = tile_pixel(TILE_NUMBER(turn), 0u, params.crop_width + group_margin(SHARERS).x);
     uint count = push.work.sample_count, samples_in_tile = TILE * TILE * count;
     uint slot = gl_LocalInvocationIndex;
 

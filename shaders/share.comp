@@ -19,7 +19,7 @@ void main() {
     }
     uint turn = number / (groups_in_tile * count), in_turn = number - turn * groups_in_tile * count;
     uint group = quotient(in_turn, count), of_pixel = in_turn - group * count;
-    uvec2 place = group_place(group), corner = tile_pixel(push.work.first_tile + turn, 0u, params.crop_width + group_margin(SHARERS).x)
+    uvec2 place = group_place(group), corner = tile_pixel(TILE_NUMBER(turn), 0u, params.crop_width + group_margin(SHARERS).x)
         - group_offset(SHARERS, push.work.first_sample + of_pixel);
     uvec2 size = uvec2(params.crop_width, params.crop_height);
     uint pairs = pairs_of(number);

@@ -101,15 +101,15 @@ impl Seen {
     fn add(&self, blocks: &mut [Block]) {
         for block in blocks {
             let of_pixels: Vec<DVec3> = self.pixels.par_iter().map(|pixel| self.mean(pixel, block)).collect();
-            let count = block.count as f32;
             for (pixel, mean) in self.pixels.iter().zip(of_pixels) {
                 let index = pixel.index as usize;
+                let count = block.counts[index] as f32;
                 for (q, mean) in mean.as_vec3().to_array().into_iter().enumerate() {
                     // The same for all samples of the block, so that their scatter stays.
                     block.squares[index][q] += mean * (2.0 * block.sums[index][q] + count * mean);
                     block.sums[index][q] += count * mean;
                 }
-                block.invalid[0] += if mean.is_finite() { 0 } else { u64::from(block.count) };
+                block.invalid[0] += if mean.is_finite() { 0 } else { u64::from(block.counts[index]) };
             }
         }
     }
@@ -143,6 +143,10 @@ impl<B: Backend> Backend for WithSeen<B> {
         let mut blocks = self.device.render(samples)?;
         self.seen.add(&mut blocks);
         Ok(blocks)
+    }
+
+    fn allocate(&mut self, trial: u32) -> Result<(), BackendError> {
+        self.device.allocate(trial)
     }
 }
 

@@ -46,11 +46,13 @@ pub enum Lever {
     NoSeals,
     /// Without probes through glass.
     NoGuides,
+    /// With the same number of samples in each pixel.
+    NoAllocation,
 }
 
 impl Lever {
     /// All of them, the whole program first.
-    pub const LEVERS: [Lever; 9] = [
+    pub const LEVERS: [Lever; 10] = [
         Lever::All,
         Lever::NoPilot,
         Lever::NoSharing,
@@ -60,6 +62,7 @@ impl Lever {
         Lever::NoEquiangular,
         Lever::NoSeals,
         Lever::NoGuides,
+        Lever::NoAllocation,
     ];
 
     /// Its name in the results.
@@ -74,13 +77,14 @@ impl Lever {
             Lever::NoEquiangular => "no equiangular",
             Lever::NoSeals => "no seals",
             Lever::NoGuides => "no guides",
+            Lever::NoAllocation => "no allocation",
         }
     }
 
     /// The tables without it, or nothing if the scene had no use for it.
     fn pull(self, packed: Packed) -> Option<Packed> {
         let useful = match self {
-            Lever::All | Lever::NoPilot => true,
+            Lever::All | Lever::NoPilot | Lever::NoAllocation => true,
             Lever::NoSharing | Lever::NoReconstruction => pilot::can_share_paths(&packed),
             Lever::NoSeen => packed.primitives.iter().any(|primitive| primitive.light != 0),
             Lever::NoImmediates => packed.immediate_count > 0,
@@ -231,10 +235,11 @@ pub struct Ready<'a> {
 impl Ready<'_> {
     /// Renders a picture, and returns it with the samples of each pixel and the time that they took, the pilot's included.
     pub fn render(&mut self, budget: Budget) -> Result<(Image, u32, Time), BenchError> {
+        let allocate = self.lever != Lever::NoAllocation;
         let options = match budget {
-            Budget::Samples(spp) => Options { samples: 0..spp, time_limit: None },
+            Budget::Samples(spp) => Options { samples: 0..spp, time_limit: None, allocate },
             Budget::Seconds(seconds) => {
-                Options { samples: 0..MOST_SAMPLES, time_limit: Some(Duration::from_secs_f64(seconds)) }
+                Options { samples: 0..MOST_SAMPLES, time_limit: Some(Duration::from_secs_f64(seconds)), allocate }
             }
         };
         let error = |cause: String| BenchError::Render { scene: self.name.to_owned(), cause };

@@ -1,6 +1,9 @@
 // Which pixel and sample an invocation works on.
 #include "lib/math.glsl"
 
+// The number, in the crop window, of a tile of the dispatch. SAMPLE is what the including kernel reads samples by.
+#define TILE_NUMBER(turn) whole(SAMPLE(push.work.first_tile + (turn) / 4u)[(turn) % 4u])
+
 // Column and row, within the crop window, of a pixel of a tile. Tiles and the pixels in them go row by row.
 uvec2 tile_pixel(uint tile, uint pixel, uint crop_width) {
     uint tiles_across = (crop_width + TILE - 1u) / TILE;

@@ -69,7 +69,8 @@ fn render(
             crop.height,
         ),
     );
-    let options = Options { samples: 0..spp, time_limit: args.time_limit };
+    let allocate = !args.no_allocation && scene.moments.is_none();
+    let options = Options { samples: 0..spp, time_limit: args.time_limit, allocate };
     let rendered = session::render(backend, pixels, &options, interrupt, &mut |progress| reporter.update(progress));
     reporter.finish();
     let rendered = rendered?;
@@ -200,9 +201,14 @@ mod tests {
             let block = |first: u32| {
                 let count = 16.min(samples.end - first);
                 let sum = vec![[count as f32 * self.value; 3]; 6];
-                Block { first, count, squares: sum.clone(), sums: sum, shared: None, invalid: self.invalid }
+                let (counts, invalid) = (vec![count; 6], self.invalid);
+                Block { first, count, counts, squares: sum.clone(), sums: sum, invalid, ..Block::default() }
             };
             Ok(samples.clone().step_by(16).map(block).collect())
+        }
+
+        fn allocate(&mut self, _trial: u32) -> Result<(), BackendError> {
+            Ok(())
         }
     }
 

@@ -60,8 +60,13 @@ impl Buffer {
 
     /// Overwrites the first values.
     pub fn write<T: Pod>(&mut self, values: &[T]) {
+        self.write_behind(0, values);
+    }
+
+    /// Overwrites the values behind the first so many bytes.
+    pub fn write_behind<T: Pod>(&mut self, first: usize, values: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(values);
-        self.bytes_mut()[..bytes.len()].copy_from_slice(bytes);
+        self.bytes_mut()[first..first + bytes.len()].copy_from_slice(bytes);
     }
 
     /// The first `count` values.

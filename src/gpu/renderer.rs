@@ -5,10 +5,11 @@ use super::kernel::Kernel;
 use super::shader::{Variant, compile_cached, expand};
 use super::{Device, Error};
 use crate::pack::Packed;
-use crate::pack::groups::{group_margin, group_offset};
-use crate::pack::layout::{Dispatch, RECORD_VECTORS, TILE};
+use crate::pack::groups::group_offset;
+use crate::pack::layout::{Dispatch, Params, RECORD_VECTORS, TILE};
 use crate::pack::sobol;
-use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo, RUN_SAMPLES, Shared};
+use crate::render::allocation::{self, Allocation, Level, tile_grid};
+use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo, RUN_SAMPLES, Run};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -33,13 +34,15 @@ pub struct Renderer {
     resolve: Kernel,
     /// The tables that kernels only read, in the order of their bindings.
     tables: [Buffer; 11],
-    params: Buffer,
+    params: Params,
+    params_buffer: Buffer,
     samples: Buffer,
     sums: Buffer,
     invalid: Buffer,
     crop: [u32; 2],
     /// Samples that `samples` holds.
     capacity: usize,
+    allocation: Allocation,
 }
 
 /// What connects the paths of a group of pixels. Their records lie behind the samples, and then the densities of connections.
@@ -106,12 +109,14 @@ impl Renderer {
             sharing,
             resolve,
             tables,
-            params: Buffer::new(device, "params", &[packed.params])?,
-            samples: Buffer::zeroed::<[f32; 4]>(device, "samples", capacity * vectors_of_sample(sharers))?,
+            params: packed.params,
+            params_buffer: Buffer::new(device, "params", &[packed.params])?,
+            samples: Buffer::zeroed::<[f32; 4]>(device, "samples", samples_length(capacity, sharers))?,
             sums: Buffer::zeroed::<[f32; 4]>(device, "sums", sums_length(pixels, capacity, sharers))?,
             invalid: Buffer::zeroed::<[u32; 4]>(device, "invalid", capacity / TILE_PIXELS)?,
             crop,
             capacity,
+            allocation: Allocation::uniform(crop, sharers as u32),
         })
     }
 
@@ -120,29 +125,35 @@ impl Renderer {
     pub fn working_memory(crop: [u32; 2], sharers: u32) -> (u64, u64) {
         let pixels = tile_count(crop, sharers) as usize * TILE_PIXELS;
         let capacity = capacity(pixels, sharers as usize, u64::MAX);
-        let of_samples = capacity * vectors_of_sample(sharers as usize);
-        let quads = of_samples + sums_length(pixels, capacity, sharers as usize) + capacity / TILE_PIXELS;
-        // A block has a sum and a sum of squares for each channel of a pixel, and what was shared in each run.
-        let sums_of_block = if sharers == 0 { 2 } else { 2 + u64::from(BLOCK_SAMPLES / RUN_SAMPLES) };
+        let quads = samples_length(capacity, sharers as usize)
+            + sums_length(pixels, capacity, sharers as usize)
+            + capacity / TILE_PIXELS;
         let blocks = (capacity / pixels / BLOCK_SAMPLES as usize).max(1);
-        let block = u64::from(crop[0]) * u64::from(crop[1]) * size_of::<[f32; 3]>() as u64 * sums_of_block;
-        ((quads * size_of::<[f32; 4]>()) as u64, blocks as u64 * block)
+        let block = crop[0] as usize * crop[1] as usize * Block::bytes_of_pixel(sharers);
+        ((quads * size_of::<[f32; 4]>()) as u64, (blocks * block) as u64)
     }
 
     /// Renders some samples of some tiles, and adds them to the blocks that they belong to.
-    fn dispatch(&mut self, samples: Range<u32>, tiles: Range<u32>, blocks: &mut [Block]) -> Result<(), Error> {
-        let tile_count = tiles.end - tiles.start;
+    fn dispatch(&mut self, part: &Part, blocks: &mut [Block]) -> Result<(), Error> {
+        let tile_count = part.tiles.len() as u32;
+        let first_tile = self.capacity * vectors_of_sample(self.sharers() as usize);
+        // Neighbouring tiles cost alike: a step coprime to their number spreads them over the processors.
+        let step = coprime_step(tile_count);
+        let tiles: Vec<u32> = (0..tile_count)
+            .map(|turn| part.tiles[(u64::from(turn) * u64::from(step) % u64::from(tile_count)) as usize])
+            .collect();
+        let numbers: Vec<f32> = tiles.iter().map(|tile| *tile as f32).collect();
+        self.samples.write_behind(first_tile * size_of::<[f32; 4]>(), &numbers);
         let work = Dispatch {
-            first_sample: samples.start,
-            sample_count: samples.end - samples.start,
-            first_tile: tiles.start,
+            first_sample: part.samples.start,
+            sample_count: part.samples.end - part.samples.start,
             tile_count,
-            tile_step: coprime_step(tile_count),
+            first_tile: first_tile as u32,
             first_record: self.capacity as u32,
             first_pair: (self.capacity * (1 + RECORD_VECTORS as usize)) as u32,
             ..Dispatch::default()
         };
-        let buffers: Vec<&Buffer> = self.tables.iter().chain([&self.samples, &self.params]).collect();
+        let buffers: Vec<&Buffer> = self.tables.iter().chain([&self.samples, &self.params_buffer]).collect();
         let mut addresses = [0u64; ADDRESS_BYTES / 8];
         if self.device.buffer_reference {
             for (address, buffer) in addresses.iter_mut().zip(&buffers[..ADDRESSES]) {
@@ -157,48 +168,72 @@ impl Renderer {
             share.dispatch(&buffers, &push, groups.div_ceil(self.device.subgroup_size))?;
         }
 
-        self.invalid.write(&vec![[0u32; 4]; blocks.len()]);
+        self.invalid.write(&vec![[0u32; 4]; work.sample_count.div_ceil(BLOCK_SAMPLES) as usize]);
         let pixels = tile_count as usize * TILE_PIXELS;
         let groups = (pixels as u32).div_ceil(self.device.subgroup_size);
-        let buffers = [&self.samples, &self.sums, &self.invalid, &self.params];
+        let buffers = [&self.samples, &self.sums, &self.invalid, &self.params_buffer];
         self.resolve.dispatch(&buffers, bytemuck::bytes_of(&work), groups)?;
-        self.collect(&samples, tiles.start, pixels, blocks);
+        self.collect(part, &tiles, blocks);
         Ok(())
     }
 
-    /// Takes the sums of a dispatch from tiles to rows of the crop window.
-    fn collect(&self, samples: &Range<u32>, first_tile: u32, pixels: usize, blocks: &mut [Block]) {
+    /// Takes the sums of a dispatch from tiles to rows of the crop window. `tiles` are in the order in which they were rendered.
+    fn collect(&self, part: &Part, tiles: &[u32], blocks: &mut [Block]) {
         let sharers = self.sharers();
-        let (samples_of_sum, vectors) = sum_format(sharers as usize);
-        let starts = samples.clone().step_by(samples_of_sum);
-        let sums: Vec<[f32; 4]> = self.sums.read(vectors * pixels * starts.len());
+        let vectors = vectors_of_sum(sharers as usize);
+        let Range { start: first, end } = part.samples;
+        let length = vectors * tiles.len() * TILE_PIXELS;
+        let sums: Vec<[f32; 4]> = self.sums.read(length * (end - first).div_ceil(RUN_SAMPLES) as usize);
+        let first_block = blocks[0].first / BLOCK_SAMPLES;
+        let block_of = |sample: u32| (part.level.asked(sample) / BLOCK_SAMPLES - first_block) as usize;
         let [width, height] = self.crop.map(|side| side as usize);
-        let tiles_across = (width + group_margin(sharers)[0] as usize).div_ceil(TILE as usize);
-        for (start, sums) in starts.zip(sums.chunks_exact(vectors * pixels)) {
-            let in_dispatch = start - samples.start;
-            let block = &mut blocks[(in_dispatch / BLOCK_SAMPLES) as usize];
-            let run = (in_dispatch % BLOCK_SAMPLES / RUN_SAMPLES) as usize;
+        let tiles_across = tile_grid(self.crop, sharers)[0] as usize;
+        for (start, sums) in (first..end).step_by(RUN_SAMPLES as usize).zip(sums.chunks_exact(length)) {
+            let block = &mut blocks[block_of(start)];
             let [dx, dy] = group_offset(sharers, start).map(|shift| shift as usize);
             for (slot, sums) in sums.chunks_exact(vectors).enumerate() {
-                let (tile, pixel) = (first_tile as usize + slot / TILE_PIXELS, slot % TILE_PIXELS);
+                let (tile, pixel) = (tiles[slot / TILE_PIXELS] as usize, slot % TILE_PIXELS);
                 let x = (tile % tiles_across * TILE as usize + pixel % TILE as usize).wrapping_sub(dx);
                 let y = (tile / tiles_across * TILE as usize + pixel / TILE as usize).wrapping_sub(dy);
                 if x < width && y < height {
-                    let pixel = y * width + x;
-                    add(&mut block.sums[pixel], sums[0]);
-                    add(&mut block.squares[pixel], sums[1]);
-                    if let Some(shared) = &mut block.shared {
-                        shared.runs[run][pixel] = [sums[2][0], sums[2][1], sums[2][2]];
-                    }
+                    let rgb = |vector: usize| sums.get(vector).map_or([0.0; 3], |v| [v[0], v[1], v[2]]);
+                    let count = RUN_SAMPLES.min(end - start);
+                    let run = Run { first: start, count, sum: rgb(0), squares: rgb(1), shared: rgb(2) };
+                    block.add_run(y * width + x, &run);
                 }
             }
         }
-        let invalid: Vec<[u32; 4]> = self.invalid.read(blocks.len());
-        for (block, invalid) in blocks.iter_mut().zip(&invalid) {
-            for (total, count) in block.invalid.iter_mut().zip(invalid) {
+        let invalid: Vec<[u32; 4]> = self.invalid.read((end - first).div_ceil(BLOCK_SAMPLES) as usize);
+        for (start, invalid) in (first..end).step_by(BLOCK_SAMPLES as usize).zip(&invalid) {
+            for (total, count) in blocks[block_of(start)].invalid.iter_mut().zip(invalid) {
                 *total += u64::from(*count);
             }
         }
+    }
+
+    /// Samples of so many tiles for which there is room at once: at least a block.
+    fn room(&self, tiles: usize) -> u32 {
+        ((self.capacity / (tiles * TILE_PIXELS)) as u32 / BLOCK_SAMPLES * BLOCK_SAMPLES).max(BLOCK_SAMPLES)
+    }
+
+    /// Renders the samples of tiles with the same level where those of the range are asked for.
+    fn render_level(
+        &mut self,
+        level: Level,
+        tiles: &[u32],
+        asked: &Range<u32>,
+        blocks: &mut [Block],
+    ) -> Result<(), Error> {
+        let samples = level.samples(asked);
+        let at_once = self.room(tiles.len());
+        for first in samples.clone().step_by(at_once as usize) {
+            let samples = first..samples.end.min(first.saturating_add(at_once));
+            let tiles_at_once = self.capacity / (samples.len() * TILE_PIXELS);
+            for tiles in tiles.chunks(tiles_at_once) {
+                self.dispatch(&Part { level, samples: samples.clone(), tiles: tiles.to_vec() }, blocks)?;
+            }
+        }
+        Ok(())
     }
 
     fn sharers(&self) -> u32 {
@@ -215,45 +250,38 @@ impl Backend for Renderer {
         let device = self.device.info.name.clone();
         render_all(self, samples).map_err(|error| BackendError { device, cause: error.to_string() })
     }
+
+    fn allocate(&mut self, trial: u32) -> Result<(), BackendError> {
+        self.allocation = Allocation::uniform(self.crop, self.sharers());
+        if trial > 0 {
+            let params = Params { seed: allocation::trial_seed(self.params.seed), ..self.params };
+            self.params_buffer.write(&[params]);
+            let blocks = self.render(0..trial)?;
+            self.params_buffer.write(&[self.params]);
+            self.allocation = Allocation::measured(&blocks[0], self.crop, self.sharers());
+        }
+        Ok(())
+    }
+}
+
+/// Samples of tiles that one dispatch renders.
+struct Part {
+    level: Level,
+    /// As the tiles have them.
+    samples: Range<u32>,
+    tiles: Vec<u32>,
 }
 
 fn render_all(renderer: &mut Renderer, samples: Range<u32>) -> Result<Vec<Block>, Error> {
     assert!(samples.start.is_multiple_of(BLOCK_SAMPLES), "blocks are aligned");
     let sharers = renderer.sharers();
-    let tile_count = tile_count(renderer.crop, sharers);
     let pixel_count = renderer.crop[0] as usize * renderer.crop[1] as usize;
-    let mut blocks = Vec::new();
-    let mut first = samples.start;
-    while first < samples.end {
-        // As many samples of a pixel as there is room for, then as many tiles.
-        let room = (renderer.capacity / (tile_count as usize * TILE_PIXELS)) as u32 / BLOCK_SAMPLES * BLOCK_SAMPLES;
-        let last = samples.end.min(first.saturating_add(room.max(BLOCK_SAMPLES)));
-        let tiles_at_once = (renderer.capacity / ((last - first) as usize * TILE_PIXELS)) as u32;
-        let mut part: Vec<Block> = (first..last)
-            .step_by(BLOCK_SAMPLES as usize)
-            .map(|start| Block {
-                first: start,
-                count: (last - start).min(BLOCK_SAMPLES),
-                sums: vec![[0.0; 3]; pixel_count],
-                squares: vec![[0.0; 3]; pixel_count],
-                shared: (sharers > 0).then(|| Shared {
-                    sharers,
-                    runs: vec![
-                        vec![[0.0; 3]; pixel_count];
-                        (last - start).min(BLOCK_SAMPLES).div_ceil(RUN_SAMPLES) as usize
-                    ],
-                }),
-                invalid: [0; 3],
-            })
-            .collect();
-        let mut tile = 0;
-        while tile < tile_count {
-            let end = tile_count.min(tile + tiles_at_once);
-            renderer.dispatch(first..last, tile..end, &mut part)?;
-            tile = end;
-        }
-        blocks.append(&mut part);
-        first = last;
+    let starts = samples.clone().step_by(BLOCK_SAMPLES as usize);
+    let mut blocks: Vec<Block> = starts
+        .map(|start| Block::new(start..samples.end.min(start.saturating_add(BLOCK_SAMPLES)), pixel_count, sharers))
+        .collect();
+    for (level, tiles) in renderer.allocation.tiles_by_level() {
+        renderer.render_level(level, &tiles, &samples, &mut blocks)?;
     }
     Ok(blocks)
 }
@@ -276,26 +304,25 @@ fn vectors_of_sample(sharers: usize) -> usize {
     if sharers == 0 { 1 } else { 1 + RECORD_VECTORS as usize + sharers }
 }
 
-/// Adds the first three of four numbers.
-fn add(sum: &mut [f32; 3], numbers: [f32; 4]) {
-    sum.iter_mut().zip(numbers).for_each(|(sum, number)| *sum += number);
+/// Vectors of all samples in flight, and of the numbers of their tiles.
+fn samples_length(capacity: usize, sharers: usize) -> usize {
+    capacity * vectors_of_sample(sharers) + (capacity / TILE_PIXELS).div_ceil(4)
 }
 
-/// Samples in a sum, and vectors of four numbers that it takes: the sum, the sum of squares, and where pixels share paths what they share.
-fn sum_format(sharers: usize) -> (usize, usize) {
-    if sharers == 0 { (BLOCK_SAMPLES as usize, 2) } else { (RUN_SAMPLES as usize, 3) }
+/// Vectors of four numbers in the sum of a run: the sum, the sum of squares, and where pixels share paths what they share.
+fn vectors_of_sum(sharers: usize) -> usize {
+    if sharers == 0 { 2 } else { 3 }
 }
 
 /// Vectors of all sums in flight.
 fn sums_length(pixels: usize, capacity: usize, sharers: usize) -> usize {
-    let (samples, vectors) = sum_format(sharers);
-    vectors * (capacity.div_ceil(samples) + pixels.min(capacity))
+    vectors_of_sum(sharers) * (capacity.div_ceil(RUN_SAMPLES as usize) + pixels.min(capacity))
 }
 
 /// Tiles that cover the crop window, wherever groups are shifted.
 fn tile_count(crop: [u32; 2], sharers: u32) -> u32 {
-    let margin = group_margin(sharers);
-    (crop[0] + margin[0]).div_ceil(TILE) * (crop[1] + margin[1]).div_ceil(TILE)
+    let [columns, rows] = tile_grid(crop, sharers);
+    columns * rows
 }
 
 /// A number near the golden section of `count` that has no factor in common with it.

@@ -449,18 +449,18 @@ gpu_struct! {
         first_sample: u32,
         /// Samples of each pixel.
         sample_count: u32,
-        /// First tile of the crop window.
-        first_tile: u32,
         /// Tiles.
         tile_count: u32,
-        /// A step coprime to the number of tiles: workgroup `k` renders tile `k tile_step mod tile_count`.
-        tile_step: u32,
+        /// Among the samples, the first vector of the tiles' numbers in the crop window, four to a vector.
+        first_tile: u32,
         /// Where pixels share paths: among the samples, the first vector of the records of the paths.
         first_record: u32,
         /// There, the first vector of the densities of connections.
         first_pair: u32,
         /// Fills the sixteen bytes.
-        unused: u32,
+        unused_1: u32,
+        /// Fills the sixteen bytes.
+        unused_2: u32,
     }
 }
 

@@ -41,8 +41,10 @@ pub mod toward_light;
 pub mod warp;
 
 use crate::pack::Packed;
-use crate::pack::groups::groups;
-use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo, RUN_SAMPLES, Shared};
+use crate::pack::groups::{group_offset, groups};
+use crate::pack::layout::TILE;
+use crate::render::allocation::{self, Allocation, Level, tile_grid};
+use crate::render::{BLOCK_SAMPLES, Backend, BackendError, Block, DeviceInfo, RUN_SAMPLES, Run};
 use bindings::Tables;
 use bvh::{grid_ray, next_primitive, start_walk, step_walk};
 use glam::DVec3;
@@ -56,54 +58,69 @@ use std::ops::Range;
 pub struct Renderer {
     tables: Tables,
     info: DeviceInfo,
+    allocation: Allocation,
 }
 
 impl Renderer {
     /// Widens the tables.
     pub fn new(packed: Packed) -> Renderer {
         let driver = format!("tyndall {}", env!("CARGO_PKG_VERSION"));
-        Renderer { tables: Tables::new(&packed), info: DeviceInfo { name: "CPU reference (f64)".to_owned(), driver } }
+        let tables = Tables::new(&packed);
+        Renderer {
+            info: DeviceInfo { name: "CPU reference (f64)".to_owned(), driver },
+            allocation: Allocation::uniform(crop(&tables), tables.features.sharers),
+            tables,
+        }
     }
 
     fn render_block(&self, samples: Range<u32>) -> Block {
-        let crop = [self.tables.params.crop_width, self.tables.params.crop_height];
-        let pixels = (crop[0] * crop[1]) as usize;
+        let [width, height] = crop(&self.tables);
+        let pixels = (width * height) as usize;
         let sharers = self.tables.features.sharers;
-        let mut block = Block {
-            first: samples.start,
-            count: samples.end - samples.start,
-            sums: vec![[0.0; 3]; pixels],
-            squares: vec![[0.0; 3]; pixels],
-            shared: (sharers > 0).then(|| Shared { sharers, runs: Vec::new() }),
-            invalid: [0; 3],
-        };
-        let samples_of_run = if sharers == 0 { BLOCK_SAMPLES } else { RUN_SAMPLES };
-        for first in samples.clone().step_by(samples_of_run as usize) {
-            let run = first..samples.end.min(first + samples_of_run);
+        let mut block = Block::new(samples.clone(), pixels, sharers);
+        for (level, tiles) in self.allocation.tiles_by_level() {
+            self.render_tiles(level, &tiles, &samples, &mut block);
+        }
+        block
+    }
+
+    /// Adds to a block the samples of tiles with one level.
+    fn render_tiles(&self, level: Level, in_tiles: &[u32], asked: &Range<u32>, block: &mut Block) {
+        let crop = crop(&self.tables);
+        let sharers = self.tables.features.sharers;
+        let across = tile_grid(crop, sharers)[0];
+        let samples = level.samples(asked);
+        for first in samples.clone().step_by(RUN_SAMPLES as usize) {
+            let run = first..samples.end.min(first + RUN_SAMPLES);
+            let [dx, dy] = group_offset(sharers, first);
+            let of_tiles = |group: &Vec<[u32; 2]>| {
+                let tile = group.first().map(|[x, y]| (y + dy) / TILE * across + (x + dx) / TILE);
+                tile.is_some_and(|tile| in_tiles.binary_search(&tile).is_ok())
+            };
             // In parallel by pixel or group of pixels; the samples of each in order, so the sums are always the same.
             let sums: Vec<(usize, PixelSums)> = groups(crop, sharers, first)
                 .into_par_iter()
+                .filter(of_tiles)
                 .flat_map_iter(|group| {
                     let sums = self.group_sums(&group, run.clone());
                     group.into_iter().map(|[x, y]| (y * crop[0] + x) as usize).zip(sums)
                 })
                 .collect();
-            let mut shared = vec![[0.0; 3]; pixels];
+            let rounded = |v: DVec3| v.as_vec3().to_array();
             for (index, pixel) in sums {
-                for q in 0..3 {
-                    block.sums[index][q] += pixel.sum[q] as f32;
-                    block.squares[index][q] += pixel.squares[q] as f32;
-                }
-                shared[index] = pixel.shared.as_vec3().to_array();
+                let of_pixel = Run {
+                    first,
+                    count: run.len() as u32,
+                    sum: rounded(pixel.sum),
+                    squares: rounded(pixel.squares),
+                    shared: rounded(pixel.shared),
+                };
+                block.add_run(index, &of_pixel);
                 for (total, count) in block.invalid.iter_mut().zip(pixel.invalid) {
                     *total += count;
                 }
             }
-            if let Some(of_block) = &mut block.shared {
-                of_block.runs.push(shared);
-            }
         }
-        block
     }
 
     /// Mirror of `resolve.comp`, for pixels that share their paths, or a single one.
@@ -137,6 +154,23 @@ impl Backend for Renderer {
         let starts = samples.clone().step_by(BLOCK_SAMPLES as usize);
         Ok(starts.map(|first| self.render_block(first..samples.end.min(first.saturating_add(BLOCK_SAMPLES)))).collect())
     }
+
+    fn allocate(&mut self, trial: u32) -> Result<(), BackendError> {
+        let (crop, sharers) = (crop(&self.tables), self.tables.features.sharers);
+        self.allocation = Allocation::uniform(crop, sharers);
+        if trial > 0 {
+            let seed = self.tables.params.seed;
+            self.tables.params.seed = allocation::trial_seed(seed);
+            let block = self.render_block(0..trial);
+            self.tables.params.seed = seed;
+            self.allocation = Allocation::measured(&block, crop, sharers);
+        }
+        Ok(())
+    }
+}
+
+fn crop(tables: &Tables) -> [u32; 2] {
+    [tables.params.crop_width, tables.params.crop_height]
 }
 
 /// What a block has of one pixel.

@@ -1,7 +1,6 @@
 //! The film: sums of samples in double precision, and what can be said of them.
 
-use super::{BLOCK_SAMPLES, Block, INVALID_CAUSES, RUN_SAMPLES, RUN_SHIFTS, Shared};
-use crate::pack::groups::{run_half, run_shift};
+use super::{BLOCK_SAMPLES, Block, INVALID_CAUSES, RUN_SHIFTS, Shared, SharedSum};
 
 /// Fraction of the film's mean below which a pixel's relative error is taken against this floor, as in
 /// [`crate::image::metrics`].
@@ -17,6 +16,8 @@ pub struct Film {
     first: u32,
     /// Sample behind the last one so far.
     end: u32,
+    /// Samples of each pixel.
+    counts: Vec<u32>,
     /// Σ radiance of each pixel.
     sums: Vec<[f64; 3]>,
     /// Σ radiance² of each pixel.
@@ -33,16 +34,7 @@ pub struct SharedSums {
     /// Pixels of a group.
     pub sharers: u32,
     /// For each half of the render and each shift of its groups.
-    pub halves: [[SharedSum; RUN_SHIFTS as usize]; 2],
-}
-
-/// What the pixels shared while the groups lay alike.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SharedSum {
-    /// Samples in each pixel.
-    pub count: u32,
-    /// Σ shared radiance of each pixel; empty if there are no samples.
-    pub sums: Vec<[f64; 3]>,
+    pub halves: [[SharedSum<f64>; RUN_SHIFTS as usize]; 2],
 }
 
 impl Film {
@@ -55,6 +47,7 @@ impl Film {
         Film {
             first,
             end: first,
+            counts: vec![0; pixels],
             sums: vec![[0.0; 3]; pixels],
             squares: vec![[0.0; 3]; pixels],
             shared: None,
@@ -74,10 +67,12 @@ impl Film {
         assert!((1..=BLOCK_SAMPLES).contains(&block.count), "a block has 1 to {BLOCK_SAMPLES} samples");
         assert_eq!(block.sums.len(), self.sums.len(), "a block has a sum for each pixel");
         assert_eq!(block.squares.len(), self.squares.len(), "a block has a sum of squares for each pixel");
+        assert_eq!(block.counts.len(), self.counts.len(), "a block has a number of samples for each pixel");
+        self.counts.iter_mut().zip(&block.counts).for_each(|(total, count)| *total += count);
         accumulate(&mut self.sums, &block.sums);
         accumulate(&mut self.squares, &block.squares);
         if let Some(shared) = &block.shared {
-            self.add_shared(block, shared);
+            self.add_shared(shared);
         }
         for (total, invalid) in self.invalid.iter_mut().zip(block.invalid) {
             *total += invalid;
@@ -85,16 +80,18 @@ impl Film {
         self.end += block.count;
     }
 
-    fn add_shared(&mut self, block: &Block, shared: &Shared) {
+    fn add_shared(&mut self, shared: &Shared) {
         let pixels = self.pixels();
         let sums =
             self.shared.get_or_insert_with(|| SharedSums { sharers: shared.sharers, halves: Default::default() });
         assert_eq!(shared.sharers, sums.sharers, "groups do not change while a scene is rendered");
-        for (first, run) in (block.first..).step_by(RUN_SAMPLES as usize).zip(&shared.runs) {
-            let sum = &mut sums.halves[run_half(first) as usize][run_shift(first) as usize];
-            sum.sums.resize(pixels, [0.0; 3]);
-            sum.count += RUN_SAMPLES.min(block.first + block.count - first);
-            accumulate(&mut sum.sums, run);
+        for (total, sum) in sums.halves.as_flattened_mut().iter_mut().zip(shared.halves.as_flattened()) {
+            if !sum.sums.is_empty() {
+                total.sums.resize(pixels, [0.0; 3]);
+                total.counts.resize(pixels, 0);
+                accumulate(&mut total.sums, &sum.sums);
+                total.counts.iter_mut().zip(&sum.counts).for_each(|(total, count)| *total += count);
+            }
         }
     }
 
@@ -113,9 +110,14 @@ impl Film {
         self.first..self.end
     }
 
-    /// Samples in each pixel.
+    /// Samples in each pixel; where some have more than others, on average.
     pub fn samples(&self) -> u32 {
         self.end - self.first
+    }
+
+    /// Samples of each pixel.
+    pub fn counts(&self) -> &[u32] {
+        &self.counts
     }
 
     /// Number of pixels.
@@ -133,8 +135,8 @@ impl Film {
     /// # Panics
     /// When the film is empty.
     pub fn mean(&self) -> Vec<[f64; 3]> {
-        let count = self.count();
-        self.sums.iter().map(|sum| sum.map(|sum| sum / count)).collect()
+        self.check();
+        self.sums.iter().zip(&self.counts).map(|(sum, &count)| sum.map(|sum| sum / f64::from(count))).collect()
     }
 
     /// The variance of [`Film::mean`]: the sample variance divided by the number of samples. A single sample shows no
@@ -144,8 +146,8 @@ impl Film {
     /// # Panics
     /// When the film is empty.
     pub fn variance(&self) -> Vec<[f64; 3]> {
-        let count = self.count();
-        let variance = |sum: f64, squares: f64| {
+        self.check();
+        let variance = |sum: f64, squares: f64, count: f64| {
             let scatter = squares - sum * sum / count;
             // Written so that NaN, the mark of an invalid sample, stays NaN.
             if scatter < 0.0 { 0.0 } else { scatter / ((count - 1.0).max(1.0) * count) }
@@ -153,8 +155,11 @@ impl Film {
         if self.samples() == 1 {
             return vec![[0.0; 3]; self.pixels()];
         }
-        let pixels = self.sums.iter().zip(&self.squares);
-        pixels.map(|(sum, squares)| [0, 1, 2].map(|q| variance(sum[q], squares[q]))).collect()
+        let pixels = self.sums.iter().zip(&self.squares).zip(&self.counts);
+        let of_pixel = |((sum, squares), &count): ((&[f64; 3], &[f64; 3]), &u32)| {
+            [0, 1, 2].map(|q| variance(sum[q], squares[q], f64::from(count)))
+        };
+        pixels.map(of_pixel).collect()
     }
 
     /// An estimate of the relative error of the image from the scatter of its samples: the mean over pixels and channels
@@ -174,9 +179,8 @@ impl Film {
         Some(sum / values).filter(|error| error.is_finite())
     }
 
-    fn count(&self) -> f64 {
+    fn check(&self) {
         assert!(self.samples() > 0, "an empty film has no image");
-        f64::from(self.samples())
     }
 }
 
@@ -197,7 +201,8 @@ mod tests {
         let sum = samples.iter().sum::<f32>();
         let squares = samples.iter().map(|s| s * s).sum::<f32>();
         let (sums, squares) = (vec![[sum, 2.0 * sum, 0.0]], vec![[squares, 4.0 * squares, 0.0]]);
-        Block { first, count: samples.len() as u32, sums, squares, shared: None, invalid: [0; 3] }
+        let count = samples.len() as u32;
+        Block { first, count, counts: vec![count], sums, squares, ..Block::default() }
     }
 
     #[test]

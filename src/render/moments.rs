@@ -31,12 +31,12 @@ mod tests {
             let sum = samples.iter().sum::<f32>();
             let squares = samples.iter().map(|sample| sample * sample).sum::<f32>();
             film.add(&Block {
-                shared: None,
                 first: 16 * index as u32,
                 count: samples.len() as u32,
+                counts: vec![samples.len() as u32],
                 sums: vec![[sum, 2.0 * sum, -sum]],
                 squares: vec![[squares, 4.0 * squares, squares]],
-                invalid: [0; 3],
+                ..Block::default()
             });
         }
         film

@@ -33,7 +33,7 @@ pub fn assemble(scene: &Scene, rendered: &Rendered, device: &DeviceInfo, seed: u
     for (q, name) in [(2, "Variance.B"), (1, "Variance.G"), (0, "Variance.R")] {
         image.push(name, variance.iter().map(|pixel| pixel[q] as f32).collect());
     }
-    image.push("sampleCount", vec![film.samples() as f32; film.pixels()]);
+    image.push("sampleCount", film.counts().iter().map(|&count| count as f32).collect());
     image
 }
 

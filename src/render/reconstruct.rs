@@ -19,7 +19,8 @@
 //! The estimate is unbiased as long as the weights do not depend on the samples that they weigh. A render therefore has two halves with
 //! random numbers of their own: the weights of each half are measured on the other one.
 
-use super::film::{Film, SharedSum, SharedSums};
+use super::SharedSum;
+use super::film::{Film, SharedSums};
 use crate::pack::groups::{first_of_shift, group_offset, group_size};
 use glam::DVec3;
 use std::ops::{Add, AddAssign, Mul};
@@ -56,8 +57,9 @@ fn changes(shared: &SharedSums, width: usize) -> Option<Vec<DVec3>> {
     let (by_one, by_two) = rayon::join(|| Weights::of(one), || Weights::of(two));
     let (by_one, by_two) = (by_one?, by_two?);
     let change = |half: &Half, weights: &Weights| -> Vec<DVec3> {
-        let part = half.samples / (one.samples + two.samples);
-        solve(half, weights).into_iter().zip(&half.mean).map(|(better, mean)| (better - *mean) * part).collect()
+        let changed = solve(half, weights).into_iter().zip(&half.mean).map(|(better, mean)| better - *mean);
+        let samples = half.samples.iter().zip(one.samples.iter().zip(&two.samples));
+        changed.zip(samples).map(|(change, (own, (one, two)))| change * (own / (one + two))).collect()
     };
     let (first, second) = rayon::join(|| change(one, &by_two), || change(two, &by_one));
     Some(first.into_iter().zip(second).map(|(a, b)| a + b).collect())
@@ -65,7 +67,8 @@ fn changes(shared: &SharedSums, width: usize) -> Option<Vec<DVec3>> {
 
 /// The samples of a half whose groups lay alike.
 struct Observation<'a> {
-    samples: f64,
+    /// Of each pixel; the same for the pixels of a group.
+    samples: Vec<f64>,
     sums: &'a [[f64; 3]],
     /// Of each pixel.
     group: Vec<u32>,
@@ -74,14 +77,15 @@ struct Observation<'a> {
 
 impl Observation<'_> {
     /// `shift` is one of those of the groups.
-    fn of(sum: &SharedSum, shift: u32, sharers: u32, width: usize) -> Observation<'_> {
+    fn of(sum: &SharedSum<f64>, shift: u32, sharers: u32, width: usize) -> Observation<'_> {
         let [columns, rows] = group_size(sharers).map(|side| side as usize);
         let [dx, dy] = group_offset(sharers, first_of_shift(shift)).map(|shift| shift as usize);
         let across = (width + dx).div_ceil(columns);
         let group = |pixel: usize| (((pixel / width + dy) / rows) * across + (pixel % width + dx) / columns) as u32;
         let group_count = across * (sum.sums.len() / width + dy).div_ceil(rows);
         let group = (0..sum.sums.len()).map(group).collect();
-        Observation { samples: f64::from(sum.count), sums: &sum.sums, group, group_count }
+        let samples = sum.counts.iter().map(|&count| f64::from(count)).collect();
+        Observation { samples, sums: &sum.sums, group, group_count }
     }
 
     /// Sum over the pixels of each group.
@@ -96,27 +100,35 @@ impl Observation<'_> {
 
 /// One half of a render.
 struct Half<'a> {
-    samples: f64,
+    /// Of each pixel.
+    samples: Vec<f64>,
+    /// Of each pixel, how many observations have samples of it.
+    observed: Vec<f64>,
     observations: Vec<Observation<'a>>,
     mean: Vec<DVec3>,
     width: usize,
 }
 
 impl Half<'_> {
-    /// Nothing, if the groups lay in one way only, or if a sample is not finite.
-    fn of(sums: &[SharedSum], sharers: u32, width: usize) -> Option<Half<'_>> {
+    /// Nothing, if the groups of a pixel lay in one way only, or if a sample is not finite.
+    fn of(sums: &[SharedSum<f64>], sharers: u32, width: usize) -> Option<Half<'_>> {
         let observations: Vec<Observation> = (0..)
             .zip(sums)
-            .filter(|(_, sum)| sum.count > 0)
+            .filter(|(_, sum)| !sum.sums.is_empty())
             .map(|(shift, sum)| Observation::of(sum, shift, sharers, width))
             .collect();
-        let samples: f64 = observations.iter().map(|observation| observation.samples).sum();
-        let mut mean = vec![DVec3::ZERO; observations.first()?.sums.len()];
+        let pixels = observations.first()?.sums.len();
+        let (mut samples, mut observed, mut mean) = (vec![0.0; pixels], vec![0.0; pixels], vec![DVec3::ZERO; pixels]);
         for observation in &observations {
-            mean.iter_mut().zip(observation.sums).for_each(|(mean, sum)| *mean += DVec3::from_array(*sum) / samples);
+            for (pixel, &count) in observation.samples.iter().enumerate() {
+                samples[pixel] += count;
+                observed[pixel] += f64::from(count > 0.0);
+                mean[pixel] += DVec3::from_array(observation.sums[pixel]);
+            }
         }
-        let usable = observations.len() > 1 && mean.iter().all(|mean| mean.is_finite());
-        usable.then_some(Half { samples, observations, mean, width })
+        mean.iter_mut().zip(&samples).for_each(|(mean, samples)| *mean /= *samples);
+        let usable = observed.iter().all(|&observed| observed > 1.0) && mean.iter().all(|mean| mean.is_finite());
+        usable.then_some(Half { samples, observed, observations, mean, width })
     }
 }
 
@@ -143,23 +155,24 @@ impl Weights {
         // groups in the other half would be taken from it alone.
         let positive: Vec<DVec3> = half.mean.iter().map(|mean| mean.max(DVec3::ZERO)).collect();
         let expected: Vec<DVec3> = blurred(&positive, half.width).into_iter().map(|mean| mean + floor).collect();
-        let count = half.observations.len() as f64;
         // Relative variances of one sample: of each pixel's own noise, and of all noise.
         let (mut own, mut all) = (vec![0.0; pixels], 0.0);
         for observation in &half.observations {
-            let scatter: Vec<f64> = (observation.sums.iter().zip(&half.mean).zip(&expected))
-                .map(|((sum, mean), expected)| {
-                    ((DVec3::from_array(*sum) / observation.samples - *mean) / *expected).element_sum() / 3.0
-                })
-                .collect();
-            let scale = observation.samples / (count - 1.0);
-            all += scale * scatter.iter().map(|scatter| scatter * scatter).sum::<f64>() / pixels as f64;
+            let scatter_of = |pixel: usize| {
+                let (count, sum) = (observation.samples[pixel], DVec3::from_array(observation.sums[pixel]));
+                let scatter = ((sum / count - half.mean[pixel]) / expected[pixel]).element_sum() / 3.0;
+                if count > 0.0 { scatter } else { 0.0 }
+            };
+            let scatter: Vec<f64> = (0..pixels).map(scatter_of).collect();
+            let scale = |pixel: usize| observation.samples[pixel] / (half.observed[pixel] - 1.0);
+            let squares = scatter.iter().enumerate().map(|(pixel, scatter)| scale(pixel) * scatter * scatter);
+            all += squares.sum::<f64>() / pixels as f64;
             let members = observation.group_sums(|_| 1.0);
             let sums = observation.group_sums(|pixel| scatter[pixel]);
             for (pixel, group) in observation.group.iter().enumerate() {
                 let members = members[*group as usize];
                 let alone = scatter[pixel] - sums[*group as usize] / members;
-                own[pixel] += scale * alone * alone * members / f64::max(members - 1.0, 1.0);
+                own[pixel] += scale(pixel) * alone * alone * members / f64::max(members - 1.0, 1.0);
             }
         }
         let mut own = blurred(&own, half.width);
@@ -259,8 +272,9 @@ impl System<'_> {
         for observation in &half.observations {
             let sums = observation.group_sums(|pixel| weights.precision[pixel]);
             let of_groups: Vec<f64> = sums.iter().map(|sum| weights.common / (1.0 + weights.common * sum)).collect();
-            for ((diagonal, group), w) in diagonal.iter_mut().zip(&observation.group).zip(&weights.precision) {
-                *diagonal += observation.samples * w * (1.0 - of_groups[*group as usize] * w);
+            let of_pixels = observation.group.iter().zip(&observation.samples).zip(&weights.precision);
+            for (diagonal, ((group, samples), w)) in diagonal.iter_mut().zip(of_pixels) {
+                *diagonal += samples * w * (1.0 - of_groups[*group as usize] * w);
             }
             removed.push(of_groups);
         }
@@ -281,7 +295,7 @@ impl System<'_> {
     fn apply(&self, image: &[DVec3]) -> Vec<DVec3> {
         let mut result = vec![DVec3::ZERO; image.len()];
         for (index, observation) in self.half.observations.iter().enumerate() {
-            self.add(index, |pixel| image[pixel] * observation.samples, &mut result);
+            self.add(index, |pixel| image[pixel] * observation.samples[pixel], &mut result);
         }
         result
     }
@@ -301,7 +315,7 @@ mod tests {
     use super::*;
     use crate::pack::groups::groups;
     use crate::reference::rng::{pcg4d, to_unit};
-    use crate::render::{Block, RUN_SAMPLES, Shared};
+    use crate::render::{Block, RUN_SAMPLES, Run};
 
     const WIDTH: usize = 24;
     const HEIGHT: usize = 18;
@@ -318,44 +332,41 @@ mod tests {
     /// A film of 64 samples. In each run the pixels of a group have noise in common and noise of their own, each with the given
     /// relative standard deviations and of mean 0.
     fn film(seed: u32, sharers: u32, common: f64, own: f64) -> Film {
-        film_with(seed, sharers, common, own, |_| 0.0)
+        film_with(seed, sharers, common, own, |_| 0.0, |_| 1)
     }
 
-    /// The same with something more that depends on a random number of its own for each group or pixel of a run.
-    fn film_with(seed: u32, sharers: u32, common: f64, own: f64, more: impl Fn(f64) -> f64) -> Film {
+    /// The same with something more that depends on a random number of its own for each group or pixel of a run, and with a multiple of
+    /// the samples for each group.
+    fn film_with(
+        seed: u32,
+        sharers: u32,
+        common: f64,
+        own: f64,
+        more: impl Fn(f64) -> f64,
+        times: impl Fn(u32) -> u32,
+    ) -> Film {
         let noise = |a: u32, b: u32, c: u32| (to_unit(pcg4d([seed, a, b, c])) - 0.5) * 12f64.sqrt();
         let truth = truth();
         let mut film = Film::new(WIDTH * HEIGHT, 0);
         for first in (0..64).step_by(16) {
-            let runs: Vec<Vec<[f32; 3]>> = (first..first + 16)
-                .step_by(RUN_SAMPLES as usize)
-                .map(|sample| {
-                    let mut run = vec![[0.0; 3]; WIDTH * HEIGHT];
-                    for (number, group) in (0..).zip(groups([WIDTH as u32, HEIGHT as u32], sharers, sample)) {
-                        for [x, y] in group {
-                            let pixel = y as usize * WIDTH + x as usize;
-                            let [group, single] = [noise(sample, number, 1), noise(sample, pixel as u32, 2)];
+            let mut block = Block::new(first..first + 16, WIDTH * HEIGHT, sharers);
+            for sample in (first..first + 16).step_by(RUN_SAMPLES as usize) {
+                for (number, group) in (0..).zip(groups([WIDTH as u32, HEIGHT as u32], sharers, sample)) {
+                    for [x, y] in group {
+                        let pixel = y as usize * WIDTH + x as usize;
+                        for time in 0..times(number) {
+                            let part = sample + 1000 * time;
+                            let [group, single] = [noise(part, number, 1), noise(part, pixel as u32, 2)];
                             let together = (group.truncate() + more(group.w)) * common;
                             let alone = (single.truncate() + more(single.w)) * own;
-                            run[pixel] = (truth[pixel] * (1.0 + together + alone) * 4.0).as_vec3().to_array();
+                            let sum = (truth[pixel] * (1.0 + together + alone) * 4.0).as_vec3().to_array();
+                            let run = Run { first: sample, count: RUN_SAMPLES, sum, squares: sum, shared: sum };
+                            block.add_run(pixel, &run);
                         }
                     }
-                    run
-                })
-                .collect();
-            let mut sums = vec![[0.0; 3]; WIDTH * HEIGHT];
-            for run in &runs {
-                sums.iter_mut().zip(run).for_each(|(sum, run)| (0..3).for_each(|q| sum[q] += run[q]));
+                }
             }
-            let squares = sums.clone();
-            film.add(&Block {
-                first,
-                count: 16,
-                sums,
-                squares,
-                shared: Some(Shared { sharers, runs }),
-                invalid: [0; 3],
-            });
+            film.add(&block);
         }
         film
     }
@@ -375,23 +386,40 @@ mod tests {
         }
     }
 
+    /// Some groups have twice or six times the samples of others.
+    fn uneven(group: u32) -> u32 {
+        [1, 2, 1, 6][group as usize % 4]
+    }
+
+    #[test]
+    fn groups_of_more_samples_count_for_more() {
+        let film = film_with(7, 8, 0.3, 0.1, |_| 0.0, uneven);
+        assert!(film.counts().iter().min() < film.counts().iter().max());
+        let (plain, better) = (error(&film.mean()), error(&image(&film, WIDTH as u32)));
+        assert!(better < 0.4 * plain, "{better} is not far below {plain}");
+    }
+
     #[test]
     fn the_mean_over_many_films_is_the_image() {
         // Noise as large as the image, so that weights that depend on it would show.
         let films = 300;
-        let mut deviations = [vec![], vec![]];
-        for seed in 0..films {
-            let film = film(seed, 8, 0.5, 0.3);
-            for (deviations, image) in deviations.iter_mut().zip([image(&film, WIDTH as u32), film.mean()]) {
-                let relative = |(pixel, truth): (&[f64; 3], &DVec3)| (DVec3::from(*pixel) / *truth - 1.0).element_sum();
-                deviations.push(image.iter().zip(&truth()).map(relative).sum::<f64>() / (3 * WIDTH * HEIGHT) as f64);
+        for times in [|_| 1, uneven as fn(u32) -> u32] {
+            let mut deviations = [vec![], vec![]];
+            for seed in 0..films {
+                let film = film_with(seed, 8, 0.5, 0.3, |_| 0.0, times);
+                for (deviations, image) in deviations.iter_mut().zip([image(&film, WIDTH as u32), film.mean()]) {
+                    let relative =
+                        |(pixel, truth): (&[f64; 3], &DVec3)| (DVec3::from(*pixel) / *truth - 1.0).element_sum();
+                    let sum = image.iter().zip(&truth()).map(relative).sum::<f64>();
+                    deviations.push(sum / (3 * WIDTH * HEIGHT) as f64);
+                }
             }
-        }
-        for deviations in deviations {
-            let count = f64::from(films);
-            let mean = deviations.iter().sum::<f64>() / count;
-            let error = (deviations.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / count / (count - 1.0)).sqrt();
-            assert!(mean.abs() < 4.0 * error && error < 2e-3, "{mean} ± {error}");
+            for deviations in deviations {
+                let count = f64::from(films);
+                let mean = deviations.iter().sum::<f64>() / count;
+                let error = (deviations.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / count / (count - 1.0)).sqrt();
+                assert!(mean.abs() < 4.0 * error && error < 2e-3, "{mean} ± {error}");
+            }
         }
     }
 
@@ -399,7 +427,7 @@ mod tests {
     fn rare_bright_samples_do_not_mislead_the_weights() {
         // One in a hundred.
         let bright = |random: f64| if random > 0.49 * 12f64.sqrt() { 100.0 } else { 0.0 };
-        let film = film_with(6, 8, 0.3, 0.1, bright);
+        let film = film_with(6, 8, 0.3, 0.1, bright, |_| 1);
         let (plain, better) = (error(&film.mean()), error(&image(&film, WIDTH as u32)));
         assert!(better < 0.7 * plain, "{better} is not far below {plain}");
     }
@@ -416,17 +444,13 @@ mod tests {
         let film_without = film(4, 8, 0.0, 0.0);
         assert_eq!(image(&film_without, WIDTH as u32), film_without.mean());
         let mut film = film(5, 8, 0.3, 0.1);
-        let mut runs = vec![vec![[0.0; 3]; WIDTH * HEIGHT]; 4];
-        runs[1][7] = [f32::NAN; 3];
-        let (sums, squares) = (runs[1].clone(), runs[1].clone());
-        film.add(&Block {
-            first: 64,
-            count: 16,
-            sums,
-            squares,
-            shared: Some(Shared { sharers: 8, runs }),
-            invalid: [1, 0, 0],
-        });
+        let mut block = Block::new(64..80, WIDTH * HEIGHT, 8);
+        for pixel in 0..WIDTH * HEIGHT {
+            let shared = [if pixel == 7 { f32::NAN } else { 0.0 }; 3];
+            block.add_run(pixel, &Run { first: 64, count: 16, sum: shared, squares: shared, shared });
+        }
+        block.invalid = [1, 0, 0];
+        film.add(&block);
         let image = image(&film, WIDTH as u32);
         assert!(image[7][0].is_nan() && image[8] == film.mean()[8]);
     }
@@ -434,16 +458,14 @@ mod tests {
     #[test]
     fn few_samples_leave_the_mean() {
         let mut short = Film::new(WIDTH * HEIGHT, 0);
-        let sums = vec![[1.0; 3]; WIDTH * HEIGHT];
-        let runs = vec![sums.clone(), sums.clone()];
-        short.add(&Block {
-            first: 0,
-            count: 8,
-            squares: sums.clone(),
-            sums,
-            shared: Some(Shared { sharers: 4, runs }),
-            invalid: [0; 3],
-        });
+        let mut block = Block::new(0..8, WIDTH * HEIGHT, 4);
+        for pixel in 0..WIDTH * HEIGHT {
+            for first in [0, 4] {
+                let one = [1.0 + pixel as f32; 3];
+                block.add_run(pixel, &Run { first, count: 4, sum: one, squares: one, shared: one });
+            }
+        }
+        short.add(&block);
         assert_eq!(image(&short, WIDTH as u32), short.mean());
     }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::film::Film;
-use super::{BLOCK_SAMPLES, Backend, BackendError};
+use super::{BLOCK_SAMPLES, Backend, BackendError, Block};
 
 /// A dispatch should take at least this long, so that what surrounds it does not count...
 const SHORTEST_DISPATCH: Duration = Duration::from_millis(500);
@@ -14,8 +14,12 @@ const SHORTEST_DISPATCH: Duration = Duration::from_millis(500);
 const LONGEST_DISPATCH: Duration = Duration::from_millis(1000);
 /// Bytes of blocks that one dispatch may return: what it takes to double the dispatches ends here.
 const DISPATCH_BYTES: usize = 256 << 20;
-/// Bytes of one pixel in a block.
-const PIXEL_BYTES: usize = 2 * size_of::<[f32; 3]>();
+/// A render of fewer samples has as many in each pixel: what it takes to measure noise would not pay.
+const LEAST_ALLOCATED: u32 = 2 * BLOCK_SAMPLES;
+/// Samples on which noise is measured, and in renders of many samples.
+const TRIAL: u32 = 2;
+const LONG_TRIAL: u32 = 4;
+const MANY_SAMPLES: u32 = 8 * BLOCK_SAMPLES;
 
 /// What to render and for how long.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,6 +28,8 @@ pub struct Options {
     pub samples: Range<u32>,
     /// Ends the render when it has taken this long, or as soon after as the running dispatch ends.
     pub time_limit: Option<Duration>,
+    /// Whether pixels get more samples where there is noise, and fewer elsewhere, see [`super::allocation`]; from 32 samples on.
+    pub allocate: bool,
 }
 
 /// How far a render has come, after each dispatch.
@@ -90,6 +96,9 @@ fn render_by_clock(
     let mut film = Film::new(pixels, first);
     let mut pace = Pace::new(pixels);
     let mut now = Duration::ZERO;
+    let allocate = options.allocate && total >= LEAST_ALLOCATED;
+    let trial = if total < MANY_SAMPLES { TRIAL } else { LONG_TRIAL };
+    backend.allocate(if allocate { trial } else { 0 })?;
     let outcome = loop {
         let begin = film.range().end;
         let blocks = pace.blocks(options.time_limit.map(|limit| limit.saturating_sub(now)));
@@ -126,7 +135,7 @@ struct Pace {
 
 impl Pace {
     fn new(pixels: usize) -> Self {
-        let most = DISPATCH_BYTES / (PIXEL_BYTES * pixels.max(1));
+        let most = DISPATCH_BYTES / (Block::bytes_of_pixel(0) * pixels.max(1));
         Pace { next: 1, most: u32::try_from(most).unwrap_or(u32::MAX).max(1), block_time: None }
     }
 
@@ -152,7 +161,7 @@ impl Pace {
 mod tests {
     use std::cell::{Cell, RefCell};
 
-    use super::super::{Block, DeviceInfo};
+    use super::super::DeviceInfo;
     use super::*;
 
     const PIXELS: usize = 3;
@@ -163,6 +172,7 @@ mod tests {
         clock: &'a Cell<Duration>,
         block_time: Duration,
         dispatches: &'a RefCell<Vec<Range<u32>>>,
+        trials: &'a RefCell<Vec<u32>>,
         during: &'a dyn Fn(&Range<u32>) -> Result<(), BackendError>,
         invalid: [u64; 3],
     }
@@ -181,16 +191,23 @@ mod tests {
                 let value = |pixel: usize| 1.0 / (1.0 + first as f32 + pixel as f32);
                 let sums = (0..PIXELS).map(|pixel| [value(pixel), 2.0 * value(pixel), 0.1]).collect();
                 let squares = (0..PIXELS).map(|pixel| [value(pixel), 3.0, 0.2]).collect();
-                blocks.push(Block { shared: None, first, count, sums, squares, invalid: self.invalid });
+                let counts = vec![count; PIXELS];
+                blocks.push(Block { first, count, counts, sums, squares, invalid: self.invalid, ..Block::default() });
                 self.clock.set(self.clock.get() + self.block_time);
             }
             Ok(blocks)
+        }
+
+        fn allocate(&mut self, trial: u32) -> Result<(), BackendError> {
+            self.trials.borrow_mut().push(trial);
+            Ok(())
         }
     }
 
     struct Run {
         result: Result<Rendered, BackendError>,
         dispatches: Vec<Range<u32>>,
+        trials: Vec<u32>,
         progress: Vec<Progress>,
     }
 
@@ -201,13 +218,14 @@ mod tests {
         interrupt: &AtomicBool,
         during: &dyn Fn(&Range<u32>) -> Result<(), BackendError>,
     ) -> Run {
-        let (clock, dispatches) = (Cell::new(Duration::ZERO), RefCell::new(Vec::new()));
+        let (clock, dispatches, trials) = (Cell::new(Duration::ZERO), RefCell::default(), RefCell::default());
         let device = DeviceInfo { name: "mock".into(), driver: "none".into() };
-        let mut mock = Mock { device, clock: &clock, block_time, dispatches: &dispatches, during, invalid };
+        let mut mock =
+            Mock { device, clock: &clock, block_time, dispatches: &dispatches, trials: &trials, during, invalid };
         let mut progress = Vec::new();
         let result =
             render_by_clock(&mut mock, PIXELS, &options, interrupt, &mut |p| progress.push(p), &|| clock.get());
-        Run { result, dispatches: dispatches.into_inner(), progress }
+        Run { result, dispatches: dispatches.into_inner(), trials: trials.into_inner(), progress }
     }
 
     fn plain(options: Options, block_time: Duration) -> Run {
@@ -222,7 +240,7 @@ mod tests {
 
     #[test]
     fn dispatches_double_up_to_half_a_second() {
-        let run = plain(Options { samples: 0..16 * 60 + 5, time_limit: None }, 100 * MS);
+        let run = plain(Options { samples: 0..16 * 60 + 5, time_limit: None, allocate: false }, 100 * MS);
         let rendered = run.result.unwrap();
         assert_eq!(rendered.outcome, Outcome::Finished);
         // 100, 200, 400 ms, then 800 ms, which is between half a second and a second. The last block has 5 samples.
@@ -236,7 +254,7 @@ mod tests {
 
     #[test]
     fn dispatches_stay_small_on_a_slow_device() {
-        let run = plain(Options { samples: 0..16 * 4, time_limit: None }, 1500 * MS);
+        let run = plain(Options { samples: 0..16 * 4, time_limit: None, allocate: false }, 1500 * MS);
         assert_eq!(blocks_of(&run.dispatches), [1, 1, 1, 1]);
     }
 
@@ -254,13 +272,13 @@ mod tests {
         for _ in 0..10 {
             pace.learn(pace.next, MS);
         }
-        assert_eq!(pace.next as usize, DISPATCH_BYTES / (PIXEL_BYTES << 20));
+        assert_eq!(pace.next as usize, DISPATCH_BYTES / (Block::bytes_of_pixel(0) << 20));
         assert_eq!(Pace::new(1 << 30).most, 1);
     }
 
     #[test]
     fn the_time_limit_ends_a_render() {
-        let options = Options { samples: 0..16_000_000, time_limit: Some(3000 * MS) };
+        let options = Options { samples: 0..16_000_000, time_limit: Some(3000 * MS), allocate: false };
         let run = plain(options, 100 * MS);
         let rendered = run.result.unwrap();
         assert_eq!(rendered.outcome, Outcome::TimeLimit);
@@ -272,14 +290,14 @@ mod tests {
 
     #[test]
     fn a_time_limit_shorter_than_a_block_gives_an_image() {
-        let run = plain(Options { samples: 0..160, time_limit: Some(MS) }, 100 * MS);
+        let run = plain(Options { samples: 0..160, time_limit: Some(MS), allocate: false }, 100 * MS);
         let rendered = run.result.unwrap();
         assert_eq!((rendered.outcome, rendered.film.samples()), (Outcome::TimeLimit, 16));
     }
 
     #[test]
     fn a_render_that_ends_at_the_limit_is_finished() {
-        let run = plain(Options { samples: 0..16, time_limit: Some(100 * MS) }, 100 * MS);
+        let run = plain(Options { samples: 0..16, time_limit: Some(100 * MS), allocate: false }, 100 * MS);
         assert_eq!(run.result.unwrap().outcome, Outcome::Finished);
     }
 
@@ -291,7 +309,7 @@ mod tests {
             flag.store(samples.start == 48, Ordering::SeqCst);
             Ok(())
         };
-        let run = run(Options { samples: 0..1600, time_limit: None }, 100 * MS, [0; 3], &flag, &raise);
+        let run = run(Options { samples: 0..1600, time_limit: None, allocate: false }, 100 * MS, [0; 3], &flag, &raise);
         let rendered = run.result.unwrap();
         assert_eq!(rendered.outcome, Outcome::Interrupted);
         assert_eq!(blocks_of(&run.dispatches), [1, 2, 4]);
@@ -299,9 +317,18 @@ mod tests {
     }
 
     #[test]
+    fn noise_is_measured_where_it_pays() {
+        for (samples, allocate, trial) in [(31, true, 0), (32, true, 2), (128, true, 4), (128, false, 0)] {
+            let run = plain(Options { samples: 16..16 + samples, time_limit: None, allocate }, MS);
+            assert_eq!(run.trials, [trial], "{samples} samples");
+        }
+    }
+
+    #[test]
     fn invalid_samples_add_up() {
         let flag = AtomicBool::new(false);
-        let run = run(Options { samples: 0..160, time_limit: None }, MS, [1, 0, 5], &flag, &|_| Ok(()));
+        let run =
+            run(Options { samples: 0..160, time_limit: None, allocate: false }, MS, [1, 0, 5], &flag, &|_| Ok(()));
         assert_eq!(run.result.unwrap().film.invalid(), [10, 0, 50]);
     }
 
@@ -312,21 +339,22 @@ mod tests {
             _ => Ok(()),
         };
         let flag = AtomicBool::new(false);
-        let run = run(Options { samples: 0..160, time_limit: None }, MS, [0; 3], &flag, &fail);
+        let run = run(Options { samples: 0..160, time_limit: None, allocate: false }, MS, [0; 3], &flag, &fail);
         assert_eq!(run.result.unwrap_err().to_string(), "mock failed: lost");
     }
 
     #[test]
     fn the_film_does_not_depend_on_the_cut() {
         let film = |block_time| {
-            let run = plain(Options { samples: 32..16 * 70 + 9, time_limit: None }, block_time);
+            let run = plain(Options { samples: 32..16 * 70 + 9, time_limit: None, allocate: false }, block_time);
             (run.dispatches.len(), run.result.unwrap().film)
         };
         let (many, fine) = film(2000 * MS);
         let (few, coarse) = film(MS);
         assert!(many > 3 * few, "the two renders are cut alike: {many} and {few} dispatches");
         assert_eq!(fine, coarse);
-        let other = plain(Options { samples: 32..16 * 70 + 8, time_limit: None }, MS).result.unwrap().film;
+        let other =
+            plain(Options { samples: 32..16 * 70 + 8, time_limit: None, allocate: false }, MS).result.unwrap().film;
         assert_ne!(fine, other, "the comparison sees one sample");
     }
 }
