@@ -167,9 +167,11 @@ fn memory(scene: &Scene, packed: &Packed) -> Value {
     let may_share = scene.moments.is_none() && tyndall::pilot::can_share_paths(packed);
     let sharers = if may_share { tyndall::pilot::MOST_SHARERS } else { 0 };
     let (device_work, host_blocks) = backend::working_memory([crop.width, crop.height], sharers);
-    // Sums and sums of squares of three channels in double precision, and where pixels share paths a sum for each half and shift.
-    let sums = if may_share { 2 + 2 * tyndall::render::RUN_SHIFTS } else { 2 };
-    let film = u64::from(crop.width) * u64::from(crop.height) * u64::from(sums) * size_of::<[f64; 3]>() as u64;
+    // Sums and sums of squares of three channels in double precision, and where pixels share paths a sum for each half and shift; and
+    // numbers of samples.
+    let shifts = if may_share { 2 * tyndall::render::RUN_SHIFTS as usize } else { 0 };
+    let of_pixel = (2 + shifts) * size_of::<[f64; 3]>() + (1 + shifts) * size_of::<u32>();
+    let film = u64::from(crop.width) * u64::from(crop.height) * of_pixel as u64;
     let (tables, meshes) = (tables as u64, meshes as u64);
     json!({
         "device": { "tables": tables, "samples": device_work, "total": tables + device_work },
