@@ -79,7 +79,7 @@ pub struct RenderArgs {
     /// Each pixel has paths of its own: more noise, but independent from pixel to pixel
     #[arg(long)]
     pub no_sharing: bool,
-    /// Each pixel has the same number of samples, instead of more where the first 16 show noise and fewer elsewhere
+    /// Each pixel has the same number of samples, instead of more where a trial shows noise and fewer elsewhere
     #[arg(long)]
     pub no_allocation: bool,
     /// Also write an 8-bit sRGB PNG to look at
